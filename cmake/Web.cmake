@@ -35,4 +35,4 @@ function(mbv_page page output layer)
 endfunction()
 
 mbv_page(report html_assets.cc report)
-mbv_page(night index_assets.cc features_regress)
+mbv_page(regression index_assets.cc features_regress)

@@ -9,7 +9,7 @@ const esbuild = require('esbuild');
 // packages that are bundled with it.
 const kPages = {
   report: {header: 'report/html_assets.h', script: 'PageScript', style: 'PageStyle', packages: ['three', 'uplot']},
-  night: {header: 'features/regress/index_assets.h', script: 'IndexScript', style: 'IndexStyle', packages: []},
+  regression: {header: 'features/regress/index_assets.h', script: 'IndexScript', style: 'IndexStyle', packages: []},
 };
 
 // Literals are joined from pieces that compilers take without complaint.

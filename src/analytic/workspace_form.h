@@ -50,7 +50,7 @@ struct WorkspaceMeasure {
 struct WorkspaceForm {
   RunSummary summary;
   Diagnostics diagnostics;  ///< parameters that do not suit it
-  std::string text;         ///< findings for people
+  std::string text;         ///< findings to read
   std::vector<WorkspaceMeasure> measures;
   bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
   std::vector<WorkspaceFile> files;

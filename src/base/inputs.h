@@ -35,7 +35,8 @@ class InputWatch {
   InputWatch* outer_;
 };
 
-/// The file of `inputs` that `path` is, under any name (links included); "" if it is none of them.
+/// The file of `inputs` that `path` is, under any name (links included); "" if it is not one of
+/// them.
 [[nodiscard]] std::string SameFile(const std::string& path, const std::vector<InputFile>& inputs);
 
 }  // namespace mbv

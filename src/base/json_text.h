@@ -26,7 +26,7 @@ template <typename Json>
 /// Throws the library's parse_error.
 template <typename Json>
 [[nodiscard]] Json ParseJson(std::string_view text);
-/// is_discarded() where the text is no JSON, or nested more than 100 levels deep.
+/// is_discarded() where the text is not JSON, or nested more than 100 levels deep.
 template <typename Json>
 [[nodiscard]] Json ParseIfJson(std::string_view text);
 

@@ -6,7 +6,7 @@
 
 namespace mbv {
 
-/// What XML may hold, for writers that escape by themselves: what is no text (base/text.h) as
+/// What XML may hold, for writers that escape by themselves: what is not text (base/text.h) as
 /// U+FFFD, marks that mislead as OneLine() shows them, carriage returns as line feeds.
 [[nodiscard]] std::string XmlText(std::string_view text);
 

@@ -287,7 +287,7 @@ std::string ExchangeFolders(const Exchange& exchange) {
     SyncFolder(target.parent_path());
     return "";
   }
-  if (!IsFolder(old)) return Trouble("replace", target, "it is no folder");
+  if (!IsFolder(old)) return Trouble("replace", target, "it is not a folder");
   Carrier carrier(exchange, OursIn(target, exchange.files));
   std::string trouble = carrier.Find();
   if (trouble.empty()) trouble = carrier.Link();
@@ -385,7 +385,7 @@ OutputFolder::~OutputFolder() {
 
 // Where the result goes really, and which folder the stage is made in.
 std::string OutputFolder::Locate() {
-  if (!IsPlainPath(name_)) return TroubleWith("make", target_, "this is no name of a result");
+  if (!IsPlainPath(name_)) return TroubleWith("make", target_, "this is not a name of a result");
   std::error_code error;
   fs::create_directories(target_.parent_path(), error);
   if (error) return TroubleWith("make folder", target_.parent_path(), error.message());
@@ -396,7 +396,8 @@ std::string OutputFolder::Locate() {
     place_ = fs::canonical(place_, error);
     if (error) return TroubleWith("follow the link", target_, error.message());
   }
-  if (!fs::is_directory(place_, error)) return TroubleWith("replace", target_, "it is no folder");
+  if (!fs::is_directory(place_, error))
+    return TroubleWith("replace", target_, "it is not a folder");
   return "";
 }
 
@@ -458,7 +459,7 @@ std::string OutputFolder::Adopt(const fs::path& folder) {
     const bool link = entry->is_symlink(error);
     if (name == kFileList || (!link && entry->is_directory(error))) continue;
     if (link || !entry->is_regular_file(error) || !IsPlainPath(name)) {
-      return TroubleWith("publish", target_ / name, "it is no plain file");
+      return TroubleWith("publish", target_ / name, "it is not a plain file");
     }
     const int file = open(entry->path().c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
     if (file < 0) return TroubleWith("read", entry->path(), std::strerror(errno));

@@ -70,7 +70,7 @@ inline constexpr Role kPerturbed{"perturbed", "simulation", "MuJoCo", RoleKind::
 inline constexpr std::array kRoles = {&role::kAnalytic, &role::kReference, &role::kSimulated,
                                       &role::kSolver,   &role::kReached,   &role::kPerturbed};
 
-/// The row of this name; null for what is no witness.
+/// The row of this name; null for what is not a witness.
 [[nodiscard]] constexpr const Role* FindRole(std::string_view name) {
   for (const Role* role : kRoles) {
     if (name == *role) return role;

@@ -21,7 +21,7 @@ enum class Stop {
 /// The end of a witness' run, or of one evaluation within it.
 struct [[nodiscard]] RunSummary {
   Stop stop = Stop::kNotRun;
-  std::string message = "was not run";  ///< one sentence for people, with numbers
+  std::string message = "was not run";  ///< one sentence to read, with numbers
   double time_s = kNan;                 ///< scenario time of the trouble [s]
   std::string where = {};               ///< limb, drive or joint in trouble
   double amount = kNan;                 ///< by how much (see unit), e.g. the missing reach

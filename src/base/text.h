@@ -10,7 +10,7 @@
 
 namespace mbv {
 
-/// Offset of the first byte at or after `from` that is no UTF-8 text, or npos. Control characters
+/// Offset of the first byte at or after `from` that is not UTF-8 text, or npos. Control characters
 /// other than tab, line feed and carriage return are no text, and neither are surrogates, overlong
 /// forms and U+FFFE, U+FFFF: XML and JSON refuse them.
 [[nodiscard]] size_t FindNonText(std::string_view text, size_t from = 0);
@@ -18,7 +18,7 @@ namespace mbv {
 /// The same without line feeds, carriage returns and tabs: what can be a name.
 [[nodiscard]] size_t FindNonName(std::string_view text);
 
-/// `text` with "\x1b" for each byte that is no text: nothing that a terminal obeys.
+/// `text` with "\x1b" for each byte that is not text: nothing that a terminal obeys.
 [[nodiscard]] std::string Printable(std::string_view text);
 
 /// Lines for a terminal: printable, without carriage returns, and without marks that reverse the
@@ -45,7 +45,7 @@ namespace mbv {
 
 [[nodiscard]] bool Contains(const std::vector<std::string>& words, std::string_view word);
 
-// Text for people, broken into lines that fit.
+// Text to read, broken into lines that fit.
 
 /// Columns of a terminal that a line takes: UTF-8, where escape sequences take none.
 [[nodiscard]] size_t PrintedWidth(std::string_view line);

@@ -54,7 +54,7 @@ struct WorkerPool {
 };
 
 // Work on untrusted input, in processes of its own: whatever it does ends a child, not the
-// night.
+// program.
 
 /// As many processes as this machine runs at once; at least 1.
 [[nodiscard]] int AllCores();

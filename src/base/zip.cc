@@ -171,7 +171,7 @@ bool ZipFile::Open() {
   } else if (zip_get_num_entries(archive_, 0) == 0) {
     trouble = "it is empty";
   }
-  if (!trouble.empty()) Refuse("is no ZIP archive: " + trouble, "fetch it again");
+  if (!trouble.empty()) Refuse("is not a ZIP archive: " + trouble, "fetch it again");
   return trouble.empty();
 }
 
@@ -205,7 +205,7 @@ void ZipFile::ListEntry(std::uint64_t index) {
   if (folder) entry.path.pop_back();
   const std::string shown = Printable(entry.path);
   if (!IsPlainPath(entry.path) || FindNonName(entry.path) != std::string::npos) {
-    return Refuse(fmt::format("'{}' leads outside of the archive, or is no plain path", shown),
+    return Refuse(fmt::format("'{}' leads outside of the archive, or is not a plain path", shown),
                   kNotOurs);
   }
   if (const std::string why = WhyNotPlain(archive_, stat, &entry.executable); !why.empty()) {

@@ -44,8 +44,8 @@ struct ListedEntry {
 class ZipFile {
  public:
   /// Lists the files; folders are left out. Findings, all at once, with `file` as their place: what
-  /// is no ZIP, paths that lead outside, links and devices, two files of one path, a file that is a
-  /// folder as well, encryption, more than the limits.
+  /// is not a ZIP, paths that lead outside, links and devices, two files of one path, a file that
+  /// is a folder as well, encryption, more than the limits.
   ZipFile(const std::string& file, const ArchiveLimits& limits, Diagnostics* diagnostics);
   ~ZipFile();
   ZipFile(const ZipFile&) = delete;

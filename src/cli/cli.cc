@@ -45,7 +45,7 @@ int SayInternalError(const std::exception& error) {
 
 // NaN passes every range, and infinity most.
 std::string WhyNotFinite(const std::string& text) {
-  // What is no number at all has its own message.
+  // What is not a number at all has its own message.
   return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
 }
 
@@ -190,7 +190,7 @@ CLI::Validator OneOf(const std::vector<std::string>& words) {
       [words, list](const std::string& word) {
         if (Contains(words, word)) return std::string();
         const std::string hint = DidYouMean(word, words);
-        return fmt::format("'{}' is none of {}{}", Printable(word), list,
+        return fmt::format("'{}' is not one of {}{}", Printable(word), list,
                            hint.empty() ? "" : "\n  hint: " + hint);
       },
       "one of " + list);

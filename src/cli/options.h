@@ -27,7 +27,7 @@ class JsonOption {
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] bool wanted() const { return !path_.empty(); }
-  /// Where the text for people goes: standard error when JSON takes standard output.
+  /// Where the text to read goes: standard error when JSON takes standard output.
   [[nodiscard]] std::FILE* text() const { return path_ == "-" ? stderr : stdout; }
   /// Writes what was asked for, but not over one of `inputs`. Exit code as of
   /// WriteWholeFile().

@@ -23,7 +23,7 @@ namespace mbv {
 /// Colour: such a terminal, and NO_COLOR is not set.
 [[nodiscard]] bool WantsColor(std::FILE* to = stdout);
 
-/// Prints text for people, broken into lines that fit the terminal. What was printed to stdout
+/// Prints text to read, broken into lines that fit the terminal. What was printed to stdout
 /// before comes before.
 void SayText(std::FILE* to, std::string_view text);
 

@@ -228,7 +228,7 @@ std::string OwnText(const ComparisonInput& input, const Comparison& comparison,
 // Moves as the drive motion says that the driver computed.
 bool FollowsDriver(const ComparisonInput& input, const std::string& name) {
   const Witness* witness = FindWitness(input, name);
-  const bool engine = IsEngine(name) && input.drive_by == DriveBy::kMotion;
+  const bool engine = IsEngine(name) && PrescribesMotion(input.mode);
   return name == input.driven_by || engine || (witness != nullptr && witness->foreign);
 }
 
@@ -385,7 +385,7 @@ std::string AgreementText(const ComparisonInput& input, const Comparison& compar
 Attribution OfDisagreement(const ComparisonInput& input, const Comparison& comparison) {
   Attribution motion = internal::AttributeByOwnMotion(input, comparison);
   if (motion.text.empty()) {
-    motion = input.drive_by == DriveBy::kMotion || input.motion->free()
+    motion = PrescribesMotion(input.mode) || input.motion->free()
                  ? internal::AttributeByKinematics(input, comparison)
                  : AttributeDriven(input, comparison);
   }
@@ -393,7 +393,7 @@ Attribution OfDisagreement(const ComparisonInput& input, const Comparison& compa
     Attribution found = ByDistance(input, comparison);
     return found.text.empty() ? BySingleCheck(comparison) : found;
   }
-  if (!IsEngine(motion.odd_one_out) || input.drive_by != DriveBy::kMotion) return motion;
+  if (!IsEngine(motion.odd_one_out) || !PrescribesMotion(input.mode)) return motion;
   Attribution distance = ByDistance(input, comparison);
   if (distance.odd_one_out.empty() || distance.odd_one_out == motion.odd_one_out) return motion;
   distance.text += "; also, " + motion.text;
@@ -482,7 +482,7 @@ const CheckResult* EnergyCheck(const Comparison& comparison, const std::string& 
 }
 
 // Power that is wrong by some share loses at most that share of the energy; of a drift that is this
-// much larger it is no cause. Coarse steps leave the loops open, which costs some power, too.
+// much larger it is not a cause. Coarse steps leave the loops open, which costs some power, too.
 constexpr double kNoCause = 0.3;
 
 // The power check of the witness, if what power is off by does not explain the drift; forces and

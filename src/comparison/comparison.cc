@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "comparison/caveats.h"
 #include "comparison/compare_stiffness.h"
 #include "comparison/derivatives.h"
 #include "comparison/drive_motion.h"
@@ -13,7 +14,6 @@
 #include "comparison/force_band.h"
 #include "comparison/force_scale.h"
 #include "comparison/pair_reader.h"
-#include "comparison/reservations.h"
 #include "comparison/table_diagnosis.h"
 #include "comparison/table_tube.h"
 #include "comparison/verdict.h"
@@ -92,7 +92,7 @@ void AddCommandNotes(const ComparisonInput& input, Comparison* comparison) {
 
 // Given forces are the same in every witness.
 void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
-  if (input.drive_by == DriveBy::kForces) {
+  if (input.mode == DriveMode::kForceDriven) {
     comparison->not_compared.push_back(
         {role::kSimulated.name + std::string(" drive forces"),
          "they are the " + input.driven_by + " forces; the motion that they cause is compared"});
@@ -262,7 +262,7 @@ std::vector<std::pair<std::string, std::string>> PairsOf(const ComparisonInput& 
   }
   for (const Witness& witness : input.witnesses) {
     if (!witness.foreign) continue;
-    if (input.drive_by == DriveBy::kMotion) pairs.emplace_back(role::kSimulated.name, witness.name);
+    if (PrescribesMotion(input.mode)) pairs.emplace_back(role::kSimulated.name, witness.name);
     for (const std::string& other : before) pairs.emplace_back(witness.name, other);
     before.push_back(witness.name);
   }
@@ -327,15 +327,15 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
 
 std::string CountText(const Comparison& comparison) {
   const size_t failed = comparison.failed(), followed = comparison.followed();
-  const size_t blind = comparison.blind();
-  const size_t all = failed + comparison.verified() + followed + blind;
+  const size_t insensitive = comparison.insensitive();
+  const size_t all = failed + comparison.verified() + followed + insensitive;
   if (failed > 0) return fmt::format("{} of {} checks exceed their limits", failed, all);
   std::string text = fmt::format("all {} checks are within their limits", all);
   if (followed > 0) {
     text += fmt::format(", but {} of them compare{} a drive motion with itself and verif{} nothing",
                         followed, followed == 1 ? "s" : "", followed == 1 ? "ies" : "y");
   }
-  if (blind > 0) text += fmt::format("; {} more verify nothing", blind);
+  if (insensitive > 0) text += fmt::format("; {} more verify nothing", insensitive);
   return text;
 }
 
@@ -516,16 +516,16 @@ size_t Comparison::failed() const {
 
 size_t Comparison::verified() const {
   return Count(checks,
-               [](const CheckResult& c) { return c.pass && !c.follows && c.blind.empty(); });
+               [](const CheckResult& c) { return c.pass && !c.follows && c.insensitive.empty(); });
 }
 
 size_t Comparison::followed() const {
   return Count(checks, [](const CheckResult& c) { return c.pass && c.follows; });
 }
 
-size_t Comparison::blind() const {
+size_t Comparison::insensitive() const {
   return Count(checks,
-               [](const CheckResult& c) { return c.pass && !c.follows && !c.blind.empty(); });
+               [](const CheckResult& c) { return c.pass && !c.follows && !c.insensitive.empty(); });
 }
 
 namespace {
@@ -567,7 +567,7 @@ void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison
     (IsCommand(metric) ? commands : others)[metric] = measured;
   }
   const LimitColumn column = ColumnOf(input, witness.name);
-  const bool servo = engine && input.drive_by == DriveBy::kServos;
+  const bool servo = engine && input.mode == DriveMode::kServo;
   AddChecks(input, witness.name, "", servo ? LimitColumn::kServo : column, commands, other,
             comparison);
   AddChecks(input, witness.name, "", column, others, other, comparison);

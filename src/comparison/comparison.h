@@ -80,11 +80,11 @@ struct ComparisonInput {
   std::string driven_by;           ///< the witness whose kinematics the simulation follows
   /// Channels of reactions that statics leaves open ("hinge.reaction.fz").
   std::vector<std::string> reactions_not_unique;
-  const AlignedTable* table = nullptr;   ///< what the reference is, if it is a table
-  const DrivenTwists* twists = nullptr;  ///< TwistsFor() this; found where needed if null
-  DriveBy drive_by = DriveBy::kMotion;   ///< what moves the simulation's drives (driven.h)
-  const Trace* perturbed = nullptr;      ///< force-driven: the same run with perturbed forces
-  double perturbation = kNan;            ///< by this share of their RMS
+  const AlignedTable* table = nullptr;            ///< what the reference is, if it is a table
+  const DrivenTwists* twists = nullptr;           ///< TwistsFor() this; found where needed if null
+  DriveMode mode = DriveMode::kPrescribedMotion;  ///< what moves the simulation's drives (driven.h)
+  const Trace* perturbed = nullptr;  ///< force-driven: the same run with perturbed forces
+  double perturbation = kNan;        ///< by this share of their RMS
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
   std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
@@ -205,8 +205,8 @@ struct CheckResult {
   bool follows = false;
   double time_s = kNan;
   std::string channel;
-  bool floored = false;    ///< the value relates to a floor above the quantity itself
-  std::string blind = {};  ///< why passing verifies nothing; "" if it does
+  bool floored = false;          ///< the value relates to a floor above the quantity itself
+  std::string insensitive = {};  ///< why passing verifies nothing; "" if it does
 
   [[nodiscard]] bool of_pair() const { return !truth.empty(); }
   [[nodiscard]] bool Involves(const Role& role) const { return measured == role || truth == role; }
@@ -215,7 +215,7 @@ struct CheckResult {
 /// What the witnesses say about each other: what was found, and what follows from it.
 struct Attribution {
   std::string odd_one_out;  ///< the witness that is wrong; "" if none is, or if nothing decides
-  std::string text;         ///< one or two sentences for people
+  std::string text;         ///< one or two sentences to read
   /// Witnesses that agree where another one differs from them: a fact, whoever is wrong.
   struct Split {
     std::vector<std::string> agree = {};
@@ -289,7 +289,7 @@ struct Comparison {
   [[nodiscard]] size_t failed() const;    ///< checks that have a limit and did not pass
   [[nodiscard]] size_t verified() const;  ///< checks that passed and verify something
   [[nodiscard]] size_t followed() const;  ///< checks that passed and compare a motion with itself
-  [[nodiscard]] size_t blind() const;     ///< other checks that passed and verify nothing
+  [[nodiscard]] size_t insensitive() const;  ///< other checks that passed and verify nothing
 };
 
 [[nodiscard]] Comparison Compare(const ComparisonInput& given);

@@ -93,10 +93,10 @@ std::string SimulationDriving(const ComparisonInput& input) {
     return "free motion: the simulation starts from the state that the reference computes from the "
            "initial values; then forces alone move it";
   }
-  if (input.drive_by != DriveBy::kMotion) {
+  if (!PrescribesMotion(input.mode)) {
     const char* driver =
         (input.driven_by == role::kAnalytic ? role::kAnalytic : role::kReference).method;
-    if (input.drive_by == DriveBy::kServos) {
+    if (input.mode == DriveMode::kServo) {
       return fmt::format(
           "MuJoCo's servos follow the drive motion that the {} computes; nothing else "
           "guides the simulation's drives",
@@ -155,7 +155,7 @@ bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& c
   const bool foreign = IsForeign(input, check.measured) || IsForeign(input, check.truth);
   const bool engine = IsEngine(check.measured) || IsEngine(check.truth);
   // Force-controlled drives and servos move as forces determine.
-  const bool by_forces = input.drive_by != DriveBy::kMotion && engine;
+  const bool by_forces = !PrescribesMotion(input.mode) && engine;
   if (by_forces && metric != Metric::kDerivatives) return false;
   switch (metric) {
     case Metric::kPositionM:

@@ -283,7 +283,7 @@ Attribution AttributeServo(const Comparison& comparison) {
 
 bool SharesForces(const ComparisonInput& input, const std::string& measured,
                   const std::string& truth) {
-  return input.drive_by == DriveBy::kForces && IsEngine(measured) && truth != role::kReached;
+  return input.mode == DriveMode::kForceDriven && IsEngine(measured) && truth != role::kReached;
 }
 
 LimitColumn ColumnOfPair(const ComparisonInput& input, const std::string& measured,
@@ -296,13 +296,13 @@ LimitColumn ColumnOfPair(const ComparisonInput& input, const std::string& measur
     }
   }
   if (!IsEngine(measured)) return LimitColumn::kReference;
-  const bool servo = input.drive_by == DriveBy::kServos && truth != role::kReached;
+  const bool servo = input.mode == DriveMode::kServo && truth != role::kReached;
   return servo ? LimitColumn::kServo : input.simulation_limits;
 }
 
 std::map<Metric, double> GrowthLimits(const ComparisonInput& input, const Trace& simulated) {
   std::map<Metric, double> limits;
-  if (input.drive_by != DriveBy::kForces) return limits;
+  if (input.mode != DriveMode::kForceDriven) return limits;
   PairComparison growth;
   if (input.perturbed != nullptr) growth = ComparePair(input, *input.perturbed, simulated);
   for (const MetricRow& row : MetricRows()) {
@@ -316,7 +316,7 @@ std::map<Metric, double> GrowthLimits(const ComparisonInput& input, const Trace&
 std::map<Metric, double> CommandGrowth(const ComparisonInput& input,
                                        const WitnessMetrics& simulated) {
   std::map<Metric, double> limits;
-  if (input.drive_by != DriveBy::kForces) return limits;
+  if (input.mode != DriveMode::kForceDriven) return limits;
   WitnessMetrics perturbed;
   if (input.perturbed != nullptr) perturbed = MeasureWitness(input, *input.perturbed);
   for (const auto& [metric, measured] : simulated.metrics) {
@@ -356,12 +356,13 @@ bool IsEvidence(const ComparisonInput& input, const CheckResult& check) {
     return check.metric == Metric::kStiffnessEntry || check.metric == Metric::kComplianceEntry;
   }
   if (input.motion->free()) return IsTrajectory(check.metric);
-  switch (input.drive_by) {
-    case DriveBy::kForces:
+  switch (input.mode) {
+    case DriveMode::kForceDriven:
       return IsTrajectory(check.metric) && check.of_pair() && IsEngine(check.measured);
-    case DriveBy::kServos:
+    case DriveMode::kServo:
       return IsDriveForce(check.metric) && check.truth == role::kReached;
-    case DriveBy::kMotion:
+    case DriveMode::kInverse:
+    case DriveMode::kPrescribedMotion:
       return IsDriveForce(check.metric);
   }
   return false;
@@ -369,7 +370,7 @@ bool IsEvidence(const ComparisonInput& input, const CheckResult& check) {
 
 std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& comparison) {
   constexpr double kMost = 1e-2;  // of a radian or of the characteristic length
-  if (input.drive_by != DriveBy::kForces) return "";
+  if (input.mode != DriveMode::kForceDriven) return "";
   if (input.perturbed == nullptr) {
     return "the run with perturbed forces failed, so errors have no measure";
   }
@@ -378,7 +379,7 @@ std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& co
     if (!check.limit || !IsTrajectory(check.metric)) continue;
     if (!check.of_pair() || !IsEngine(check.measured)) continue;
     const double size = *RowOf(check.metric).unit == 'm' ? length_m : 1.0;
-    if (!(*check.limit > kMost * size)) continue;  // one that is no number fails its check
+    if (!(*check.limit > kMost * size)) continue;  // one that is not a number fails its check
     return fmt::format(
         "{:g} s are too long to drive this mechanism in open loop: forces perturbed by "
         "{:.0e} make it deviate by {:.2g} {}",
@@ -389,12 +390,13 @@ std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& co
 
 Attribution AttributeDriven(const ComparisonInput& input, const Comparison& comparison) {
   if (input.motion->free()) return {};
-  switch (input.drive_by) {
-    case DriveBy::kForces:
+  switch (input.mode) {
+    case DriveMode::kForceDriven:
       return AttributeForceDriven(input, comparison);
-    case DriveBy::kServos:
+    case DriveMode::kServo:
       return AttributeServo(comparison);
-    case DriveBy::kMotion:
+    case DriveMode::kInverse:
+    case DriveMode::kPrescribedMotion:
       return {};
   }
   return {};

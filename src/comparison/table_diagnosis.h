@@ -1,5 +1,5 @@
 // What a table that disagrees looks like: a sign, a unit, a time shift, exchanged columns. These
-// cost people days, and each has a plain signature.
+// cost days, and each has a plain signature.
 #pragma once
 
 #include <optional>

@@ -491,7 +491,7 @@ class MechanismChecker {
     const double off = (matrix * matrix.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
     if (off > kExact || matrix.determinant() < 0.0) {
       Add(path,
-          fmt::format("is no rotation: R Rᵀ − 1 is up to {:.2g}, the determinant {:.3g}", off,
+          fmt::format("is not a rotation: R Rᵀ − 1 is up to {:.2g}, the determinant {:.3g}", off,
                       matrix.determinant()),
           "the frame's axes are the columns of R");
     }

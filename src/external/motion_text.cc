@@ -148,7 +148,7 @@ std::optional<RowAnswer> ReadRowAnswer(std::string_view json, size_t states, siz
   auto answer = ReadJson(json, Answered);
   if (answer && Fits(*answer.value, states, driven)) return std::move(answer.value);
   *trouble = answer ? "rows.json does not fit the states that were asked for"
-                    : "rows.json is no answer: " + answer.refusal.Text();
+                    : "rows.json is not an answer: " + answer.refusal.Text();
   return {};
 }
 

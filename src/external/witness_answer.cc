@@ -116,8 +116,8 @@ class TraceReader {
     names.reserve(known_.size());
     for (const Channel& channel : known_) names.push_back(channel.name);
     const std::string hint = DidYouMean(name, names);
-    return fmt::format("traces.csv has a column '{}', which is no signal of the mechanism{}", name,
-                       hint.empty() ? "" : " (" + hint + ")");
+    return fmt::format("traces.csv has a column '{}', which is not a signal of the mechanism{}",
+                       name, hint.empty() ? "" : " (" + hint + ")");
   }
 
   std::string ReadRows(const TableText& text, Trace* trace) {

@@ -31,7 +31,7 @@ struct WitnessAnswer {
 
 /// traces.csv: a heading of `time_s` and channel names, then one row per sample of `times_s`, in
 /// any columns' order. Empty, with one sentence of trouble, where names are unknown or twice,
-/// samples are missing or elsewhere, or something is no finite number.
+/// samples are missing or elsewhere, or something is not a finite number.
 [[nodiscard]] std::optional<Trace> ReadWitnessTrace(std::string_view csv,
                                                     const Mechanism& mechanism,
                                                     const std::vector<double>& times_s,

@@ -40,7 +40,7 @@ struct GroupAssemblies {
                                              const std::vector<bool>& driven,
                                              const JointCoordinates& guess);
 
-/// "knee.A, knee.B: 3 ways to close; taken: knee = 0.42, …; also: knee = -1.2, …" for people.
+/// "knee.A, knee.B: 3 ways to close; taken: knee = 0.42, …; also: knee = -1.2, …" to read.
 [[nodiscard]] std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& found);
 
 }  // namespace mbv

@@ -56,7 +56,7 @@ struct HomeResult {
   std::vector<CouplingGap> couplings = {};  ///< that are missed
   std::vector<UnmetChoice> unmet = {};
 
-  /// One line for people: "limb1.S is open by 0.12 m and 0.3 rad; …" (at most three loops).
+  /// One line to read: "limb1.S is open by 0.12 m and 0.3 rad; …" (at most three loops).
   [[nodiscard]] std::string Text(const Mechanism& mechanism) const;
 };
 

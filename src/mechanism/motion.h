@@ -16,6 +16,20 @@
 
 namespace mbv {
 
+/// How a simulation moves the drives: a scenario's `simulation.mode`.
+enum class DriveMode {
+  kPrescribedMotion,  ///< `forward`: constraints hold them on the commanded motion; the force is
+                      ///< the constraint's
+  kInverse,           ///< `inverse`: on the commanded motion, inverse dynamics sample by sample
+  kForceDriven,       ///< `force_driven`: given forces in open loop, from the commanded start
+  kServo,             ///< `servo`: MuJoCo's position and velocity actuators follow the command
+};
+
+/// The drives are where the command has them, whatever forces that takes.
+[[nodiscard]] constexpr bool PrescribesMotion(DriveMode mode) {
+  return mode == DriveMode::kInverse || mode == DriveMode::kPrescribedMotion;
+}
+
 /// A scalar coordinate of a mechanism that a command can refer to.
 struct Coordinate {
   enum class Kind {

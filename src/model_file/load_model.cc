@@ -178,7 +178,7 @@ ModelHead ReadTitle(const YamlMap& file, YamlReader* yaml) {
   if (const YamlNode* text = file.Find("description")) {
     head.description = yaml->Text(*text, "description").value_or("");
   }
-  // For people and archives (features/paper/package.h); nothing is computed from it.
+  // For pages and archives (features/paper/package.h); nothing is computed from it.
   if (const YamlNode* text = file.Find("license")) (void)yaml->Text(*text, "license");
   ReadLeftOut(file.Find("left_out"), yaml, &head);
   return head;
@@ -424,6 +424,7 @@ std::optional<T> BeamReader::Described(const Block& block, const YamlMap& map,
     if (const auto found = known.find(level + *name); found != known.end()) return found->second;
   }
   std::vector<std::string> names;
+  names.reserve(known.size());
   for (const auto& [full, value] : known) names.push_back(full.substr(full.rfind('.') + 1));
   values_.yaml().Error(
       *node, fmt::format("{} = {}: there is no such {}", map.PathOf(key), Describe(*node), key),
@@ -498,7 +499,7 @@ namespace {
 
 using internal::Block;
 
-// The stages find things in their own order; people read files from the top.
+// The stages find things in their own order; findings are shown from the top.
 Diagnostics InFileOrder(const Diagnostics& diagnostics) {
   std::vector<Finding> findings = diagnostics.findings();
   std::stable_sort(findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {

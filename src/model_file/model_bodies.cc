@@ -188,7 +188,7 @@ std::optional<Shape> ShapeReader::ReadShape(const Block& block, const YamlNode& 
     shape.color = values_.yaml().Text(*color, map.PathOf("color")).value_or("steel");
     if (!IsColor(shape.color)) {
       values_.yaml().Error(
-          *color, fmt::format("{} = {} is no color", map.PathOf("color"), Describe(*color)),
+          *color, fmt::format("{} = {} is not a color", map.PathOf("color"), Describe(*color)),
           "a material's name, or '#rrggbb' or '#rrggbbaa' in quotes");
     }
   }

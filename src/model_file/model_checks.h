@@ -105,7 +105,7 @@ void CheckPlausible(const Mechanism& mechanism, ModelReport* report);
 void WarnAboutAssembly(const Mechanism& mechanism, const HomeResult& home, ModelReport* report);
 /// Makes hinges balls that are named so, if that closes the loops; false if not.
 bool TakeNamedBalls(Mechanism* mechanism, ModelReport* report);
-/// A sentence for people who state closures in a URDF file.
+/// One sentence for those who state closures in a URDF file.
 [[nodiscard]] std::string WhatWouldClose(const Mechanism& mechanism, const HomeResult& home);
 
 }  // namespace mbv::internal

@@ -306,8 +306,9 @@ bool ElementReader::ReadJointAsCarrier(const YamlNode& node, const std::string& 
     values_.yaml().Error(
         node,
         fmt::format("{}: {}", path,
-                    about_axis ? "the joint's parent is the world, which does not turn"
-                               : "the coordinate is no angle about an axis of the joint's parent"),
+                    about_axis
+                        ? "the joint's parent is the world, which does not turn"
+                        : "the coordinate is not an angle about an axis of the joint's parent"),
         about_axis ? "leave gyroscopic out" : "write axis_on: BODY and axis: [x, y, z] instead");
     return false;
   }

@@ -34,6 +34,7 @@ void ParameterReader::ReadModel(const Block& model, const YamlMap& file) {
     const YamlNode* node;
   };
   std::vector<Source> sources;
+  sources.reserve(files.size() + 1);
   for (File& other : files) sources.push_back({&other.yaml, other.root->Find("parameters")});
   sources.push_back({&yaml_, file.Find("parameters")});
   for (const Source& source : sources) Define(source.yaml, model, source.node, "parameters");
@@ -82,7 +83,7 @@ void ParameterReader::OpenFiles(YamlReader* yaml, const YamlNode& root,
   }
   file.root = file.yaml.Parse(*text);
   if (file.root == nullptr || !file.root->is_map()) {
-    yaml->Error(*node, fmt::format("parameters_from = {} is no model file", Describe(*node)));
+    yaml->Error(*node, fmt::format("parameters_from = {} is not a model file", Describe(*node)));
     others_.Append(file.yaml.diagnostics());
     return;
   }

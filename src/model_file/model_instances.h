@@ -33,7 +33,7 @@ class ParameterReader {
   /// overrides and the list.
   void DefinePart(const Block& instance, const YamlNode* parameters);
   void FinishPart(const Block& instance, const YamlNode* parameters);
-  /// Findings about overrides that no block has taken, and about values that are no number.
+  /// Findings about overrides that no block has taken, and about values that are not a number.
   void CheckOverrides();
 
   [[nodiscard]] std::vector<Parameter> Take() { return std::move(parameters_); }

@@ -56,7 +56,7 @@ void ReadScrewGuess(const Block& block, const YamlMap& map, const YamlMap::InUni
   joint->guess[1] = joint->guess[0] / per_turn;
 }
 
-// More than a turn is no guess; degrees are.
+// More than a turn is not a guess; degrees are.
 void WarnAboutGuess(const YamlNode& node, const std::string& path, const UnitSuffix& unit,
                     const Joint& joint, int k, YamlReader* yaml) {
   const double guess = joint.guess[static_cast<size_t>(k)];

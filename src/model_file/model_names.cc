@@ -24,6 +24,7 @@ std::vector<std::string> ShortNames(const std::vector<std::string>& names,
 template <typename T>
 std::vector<std::string> NamesOf(const std::vector<T>& items) {
   std::vector<std::string> names;
+  names.reserve(items.size());
   for (const T& item : items) names.push_back(item.name);
   return names;
 }
@@ -41,7 +42,7 @@ bool IsNewName(const YamlEntry& entry, const std::string& path, YamlReader* yaml
     return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-';
   });
   if (good && entry.key.size() <= 64) return true;
-  yaml->Error(entry, fmt::format("{}: '{}' is no name", path, entry.key.substr(0, 64)),
+  yaml->Error(entry, fmt::format("{}: '{}' is not a name", path, entry.key.substr(0, 64)),
               "names are made of letters, digits, _ and -; dots come from instances");
   return false;
 }

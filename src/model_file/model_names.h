@@ -22,7 +22,7 @@ inline constexpr size_t kMaxItems = 10000;  ///< of frames, shapes, drives, …
 
 /// False (after a finding, once) when a list has grown to `limit`.
 bool HasRoom(const YamlNode& at, size_t size, size_t limit, const char* what, YamlReader* yaml);
-/// False (after a finding) when a key is no name; `path` is that of the map it stands in.
+/// False (after a finding) when a key is not a name; `path` is that of the map it stands in.
 bool IsNewName(const YamlEntry& entry, const std::string& path, YamlReader* yaml);
 
 /// Index of the item of this name, or -1.

@@ -166,7 +166,7 @@ std::optional<Mat3> ModelValues::RotationMatrix(const Block& block, const YamlNo
   }
   if ((R * R.transpose()).isIdentity(kTolerance) && R.determinant() > 0.0) return R;
   yaml_.Error(node,
-              fmt::format("{} is no rotation: its rows are not a right-handed set of "
+              fmt::format("{} is not a rotation: its rows are not a right-handed set of "
                           "perpendicular unit vectors",
                           path),
               "give its numbers with ten digits, or use rpy, axes or axis with angle");

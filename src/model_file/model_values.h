@@ -40,7 +40,7 @@ struct Block {
 
   [[nodiscard]] bool is_model() const { return prefix.empty(); }
   [[nodiscard]] const YamlNode* Section(std::string_view key) const;
-  /// The entries of a section, and a finding if it is no map of names.
+  /// The entries of a section, and a finding if it is not a map of names.
   [[nodiscard]] const std::vector<YamlEntry>& Entries(const char* section, YamlReader* yaml) const;
   [[nodiscard]] std::string Note() const;  ///< " (in limb1)" for messages
   [[nodiscard]] std::string PathOf(std::string_view key) const { return JoinPath(path, key); }

@@ -70,13 +70,13 @@ class FigureChecker {
       return;
     }
     const std::vector<std::string> units = UnitsOf(si);
-    Error(unit, fmt::format(" = '{}' is no unit of what is recorded in {}", unit.text, si),
+    Error(unit, fmt::format(" = '{}' is not a unit of what is recorded in {}", unit.text, si),
           DidYouMean(unit.text, units, "units: " + Joined(units)));
   }
 
   void CheckWitness(const PlacedText& witness) {
     if (!witness.given() || Contains(roles_, witness.text)) return;
-    Error(witness, fmt::format(" = '{}' is no witness", witness.text),
+    Error(witness, fmt::format(" = '{}' is not a witness", witness.text),
           DidYouMean(witness.text, roles_, "witnesses: " + Joined(roles_)));
   }
 

@@ -106,7 +106,7 @@ class StyleReader {
       if (text && IsColor(*text)) {
         colors.push_back(*text);
       } else if (text) {
-        yaml_.Error(*(*items)[k], fmt::format("{} = '{}' is no colour", path, *text),
+        yaml_.Error(*(*items)[k], fmt::format("{} = '{}' is not a colour", path, *text),
                     "write \"#rrggbb\" with quotes, e.g. \"#0072b2\"");
       }
     }

@@ -58,7 +58,7 @@ void PlotAxis::Add(double v) {
 
 void PlotAxis::Pad() {
   if (!(low <= high)) low = 0, high = 1;
-  // Round-off of a constant is no range to show: between its ends ticks would not differ.
+  // Round-off of a constant is not a range to show: between its ends ticks would not differ.
   const double largest = std::max(std::abs(low), std::abs(high));
   const bool constant = log ? high <= low : high - low <= kRoundOff * largest;
   const double pad = !constant ? 0.04 * (high - low) : log ? 0.5 : std::max(1e-12, largest);
@@ -206,8 +206,9 @@ std::string Legend(const std::vector<LegendEntry>& entries, double* height) {
   const size_t columns = two ? 2 : 1;
   std::string svg;
   for (size_t i = 0; i < entries.size(); ++i) {
+    const size_t row = i / columns;
     const double left = kLeft + kColumn * static_cast<double>(i % columns);
-    const double y = kHeight + 4 + kRow * static_cast<double>(i / columns);
+    const double y = kHeight + 4 + kRow * static_cast<double>(row);
     svg += SvgShape("line", {{"x1", left},
                              {"x2", left + 22},
                              {"y1", y - 4},
@@ -216,7 +217,8 @@ std::string Legend(const std::vector<LegendEntry>& entries, double* height) {
                              {"stroke-width", "2.5"}}) +
            SvgText({{"x", left + 28}, {"y", y}}, entries[i].label) + "\n";
   }
-  *height += kRow * static_cast<double>((entries.size() + columns - 1) / columns);
+  const size_t rows = (entries.size() + columns - 1) / columns;
+  *height += kRow * static_cast<double>(rows);
   return svg;
 }
 

@@ -14,8 +14,9 @@ struct AlongElement {
 };
 
 AlongElement MotionOf(const ForceElement& element, const ScalarRow& row, const BodyStates& states,
-                      int rubs) {
-  AlongElement at{row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias, rubs};
+                      int friction_sign) {
+  AlongElement at{row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias,
+                  friction_sign};
   if (!IsGyroscopic(element)) return at;
   const RotorAxis& carrier = *std::get<RotorLaw>(element.law).carrier;
   const auto b = static_cast<size_t>(carrier.body);

@@ -290,7 +290,7 @@ MatX ForceSolver::ReactionsOf(const VecX& force, const BodyStates& states) const
   return reactions;
 }
 
-// A load that a self-stress changes is no load that friction could follow.
+// A load that a self-stress changes is not a load that friction could follow.
 RunSummary ForceSolver::CheckLoadsUnique(const ReferenceSample& sample,
                                          const std::vector<size_t>& loaded) {
   if (sparse_) FindSelfStress();

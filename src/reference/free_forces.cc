@@ -84,7 +84,7 @@ std::vector<int> FreeDynamics::SignsAt(const BodyStates& states) const {
   return sign;
 }
 
-// A load that a self-stress changes is no load that friction could follow.
+// A load that a self-stress changes is not a load that friction could follow.
 RunSummary FreeDynamics::CheckLoadsUnique(const ForceRows& at, const BodyStates& states) const {
   for (Eigen::Index k = 0; k < at.self_stress.cols(); ++k) {
     const VecX force = at.self_stress.col(k).cwiseProduct(at.scale);

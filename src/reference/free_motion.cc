@@ -23,7 +23,7 @@ namespace {
 namespace odeint = boost::numeric::odeint;
 
 constexpr double kSmallestStepShare = 1e-10;  // of the duration
-constexpr double kJump = 1e-6;                // a smaller share of a load is no jump
+constexpr double kJump = 1e-6;                // a smaller share of a load is not a jump
 // Below this share of the largest pivot steps go half the way to the singular pose at most.
 constexpr double kApproach = 0.2;
 constexpr size_t kMostNodes = 600;
@@ -676,8 +676,8 @@ SingularityCrossing FreeMotion::Closest(double first_s, double last_s, const Sta
   return crossing;
 }
 
-bool FreeMotion::Passes(const SingularityCrossing& passage) const {
-  return passage.pivot < kPassed * largest_pivot_;
+bool FreeMotion::Passes(const SingularityCrossing& crossing) const {
+  return crossing.pivot < kPassed * largest_pivot_;
 }
 
 std::vector<SingularityCrossing> FreeMotion::Crossings() const {

@@ -94,7 +94,7 @@ class FreeMotion {
   [[nodiscard]] bool Land(const Hermite& way, double at_s, Node* node);
   [[nodiscard]] bool RatesFit(const Hermite& way, double t_s, double to_s, double kinetic);
   void Watch();
-  [[nodiscard]] bool Passes(const SingularityCrossing& passage) const;
+  [[nodiscard]] bool Passes(const SingularityCrossing& crossing) const;
 
   // What ends a phase of friction: some elements come to rest, or what is held starts.
   struct FrictionEvent {

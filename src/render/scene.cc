@@ -369,7 +369,7 @@ Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frame
     if (std::isfinite(lower) && lower > 0.0) shortest = std::min(shortest, lower);
     if (std::isfinite(shortest)) scale.barrel_m[d] = 0.62 * shortest;
   }
-  // Rounding is no force: against the weight of a kilogram where there is no other.
+  // Rounding is not a force: against the weight of a kilogram where there is no other.
   double mass = 0.0;
   for (const Body& body : mechanism.bodies) mass += body.mass;
   const double floor_N = 1e-9 * 9.81 * (mass > 0.0 ? mass : 1.0);

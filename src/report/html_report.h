@@ -27,7 +27,7 @@ struct HtmlPicture {
 /// One numbered equation of the mechanism's paper.
 struct HtmlEquation {
   std::string equation, erratum, status, printed, corrected, note;
-  std::string residual;          ///< for people, with unit
+  std::string residual;          ///< shown, with unit
   bool right = false;            ///< as printed
   bool corrected_right = false;  ///< the corrected form is
 };

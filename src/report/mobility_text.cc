@@ -182,7 +182,7 @@ Json GroupsJson(const std::vector<StressGroup>& groups) {
 }
 
 Json PoseJson(const Mobility& m) {
-  return {{"freedoms", m.dofs},
+  return {{"dof", m.dofs},
           {"redundant", m.redundant},
           {"undriven", m.undriven},
           {"smallest_kept", m.smallest_kept},
@@ -215,7 +215,7 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
                {"joint_constraints", report.home.constraint_rows},
                {"constraint_rank", report.home.constraint_rank},
                {"kutzbach", report.home.kutzbach},
-               {"freedoms", report.dofs()},
+               {"dof", report.dofs()},
                {"home_singular", report.home_singular()},
                {"drives_singular_at_home", report.drives_singular()}};
   json["drives"] = Json::array();
@@ -236,7 +236,7 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
   for (const LoopCount& loop : report.loops) {
     json["loops"].push_back({{"closure", loop.closure},
                              {"joints", loop.joints},
-                             {"joint_freedoms", loop.joint_dofs},
+                             {"joint_dof", loop.joint_dofs},
                              {"screw_rank", loop.screw_rank}});
   }
   json["redundant_constraints"] = GroupsJson(report.redundant);

@@ -1,4 +1,4 @@
-// The mobility report of `mbverify model` for people and for programs.
+// The mobility report of `mbverify model` as text and as JSON.
 #pragma once
 
 #include <string>

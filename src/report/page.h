@@ -21,7 +21,7 @@ namespace mbv {
 /// The values as little-endian 32-bit floats.
 [[nodiscard]] std::string Base64(std::span<const float> values);
 
-/// "–" for what is no number.
+/// "–" for what is not a number.
 [[nodiscard]] std::string NumberOrDash(double value, const char* format = "{:.2e}");
 
 /// With a capital letter and a full stop.

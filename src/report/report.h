@@ -59,7 +59,7 @@ struct EngineComparison {
 
   /// Of `friction`: the error at the scenario's step, and which step tried is within the limit.
   [[nodiscard]] std::string FrictionText() const;
-  /// What an engine is called for people.
+  /// What a report calls an engine.
   [[nodiscard]] static const char* NameOf(const std::string& engine);
 };
 

@@ -60,7 +60,7 @@ ResultView ViewOfComparison(const ResultFrame& frame, const Comparison& comparis
                   .pairs = comparison.pairs.size(),
                   .verified = comparison.verified(),
                   .empty_counts = {{"checks_of_a_motion_with_itself", comparison.followed()},
-                                   {"checks_blind", comparison.blind()}}};
+                                   {"checks_insensitive", comparison.insensitive()}}};
   for (const PairComparison& pair : comparison.pairs) view.pairs_compared += pair.compared ? 1 : 0;
   for (const CheckResult& check : comparison.checks) {
     const MetricRow& row = RowOf(check.metric);
@@ -75,7 +75,7 @@ ResultView ViewOfComparison(const ResultFrame& frame, const Comparison& comparis
          .time_s = check.time_s,
          .key = IsKey(check),
          .verifies = !check.follows,
-         .blind = check.blind,
+         .insensitive = check.insensitive,
          .floored = check.floored,
          .stated_limit = check.stated_limit,
          .limit_by = check.limit_by});
@@ -90,8 +90,8 @@ ResultView ViewOfComparison(const ResultFrame& frame, const Comparison& comparis
 CheckEnd EndOf(const ShownCheck& check) {
   if (!check.limit) return CheckEnd::kOff;
   if (!check.pass) return CheckEnd::kFail;
-  if (!check.blind.empty()) return CheckEnd::kVoid;
-  return check.verifies.value_or(true) ? CheckEnd::kOk : CheckEnd::kHeld;
+  if (!check.insensitive.empty()) return CheckEnd::kInsensitive;
+  return check.verifies.value_or(true) ? CheckEnd::kOk : CheckEnd::kByConstruction;
 }
 
 std::string WhereOf(const ShownCheck& check) {
@@ -160,7 +160,7 @@ Json ChecksJson(const ResultView& view) {
       json["limit_by"] = check.limit_by;
     }
     if (check.floored) json["floored"] = true;
-    if (!check.blind.empty()) json["verifies_nothing"] = check.blind;
+    if (!check.insensitive.empty()) json["verifies_nothing"] = check.insensitive;
     checks.push_back(std::move(json));
   }
   return checks;
@@ -174,17 +174,14 @@ Json ChecksOffJson(const ResultView& view) {
   return checks;
 }
 
-// As texts, as ever, and as values.
 void AddCaveats(const std::vector<Caveat>& caveats, Json* json) {
-  Json texts = Json::array(), values = Json::array();
+  Json values = Json::array();
   for (const Caveat& caveat : caveats) {
-    texts.push_back(caveat.text);
     Json value = {{"kind", ToText(caveat.kind)}, {"of", caveat.of}};
     if (caveat.gap != WitnessGap::kNone) value["cause"] = ToText(caveat.gap);
     value["text"] = caveat.text;
     values.push_back(std::move(value));
   }
-  (*json)["reservations"] = std::move(texts);
   (*json)["caveats"] = std::move(values);
 }
 
@@ -312,7 +309,7 @@ std::vector<Cell> CheckRow(const ShownCheck& check) {
                            "",
                            WhereOf(check)};
   if (check.floored) row[4].remark = "floored";
-  if (check.blind.empty()) row[5].html = Margin(check);
+  if (check.insensitive.empty()) row[5].html = Margin(check);
   return row;
 }
 
@@ -324,9 +321,9 @@ Cell EndCell(const ShownCheck& check) {
       return {"off", Mark::kOff};
     case CheckEnd::kFail:
       return {"FAIL", Mark::kFail};
-    case CheckEnd::kVoid:
+    case CheckEnd::kInsensitive:
       return {"verifies nothing", Mark::kWarn};
-    case CheckEnd::kHeld:
+    case CheckEnd::kByConstruction:
       return {"held", Mark::kOff};
     case CheckEnd::kOk:
       break;

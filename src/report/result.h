@@ -46,7 +46,7 @@ struct ResultFrame {
 /// A check as it is shown.
 struct ShownCheck {
   std::string name, subject;  ///< "simulated_vs_analytic.force_nrmse" and its first part
-  std::string title;          ///< for people, with unit
+  std::string title;          ///< shown, with unit
   double value = kNan;
   std::optional<double> limit;  ///< empty: switched off
   bool pass = false;
@@ -54,14 +54,14 @@ struct ShownCheck {
   double time_s = kNan;               ///< of that; NaN: not a matter of time
   bool key = true;                    ///< a reader wants it even if it passes
   std::optional<bool> verifies = {};  ///< false: it passes by itself; empty: all of the kind do
-  std::string blind = {};             ///< why passing verifies nothing; "" if it does
+  std::string insensitive = {};       ///< why passing verifies nothing; "" if it does
   bool floored = false;               ///< relative to a floor above the quantity
   std::optional<double> stated_limit = {};  ///< the scenario's, where another one was taken
   std::string limit_by = {};                ///< from where then
 };
 
 /// How a check ended.
-enum class CheckEnd { kOff, kFail, kVoid, kHeld, kOk };
+enum class CheckEnd { kOff, kFail, kInsensitive, kByConstruction, kOk };
 [[nodiscard]] CheckEnd EndOf(const ShownCheck& check);
 /// Its word, the same wherever it is shown.
 [[nodiscard]] Cell EndCell(const ShownCheck& check);
@@ -153,7 +153,7 @@ void AddBreakdown(const ResultView& view, const RunSummary& summary, nlohmann::o
 /// Title, description and verdict of a result; the kind adds kicker, footer and scripts.
 [[nodiscard]] PageHead HeadOf(const ResultView& view);
 
-/// Reason, reservations, attribution, `cards` (HTML of Card()), `about` (HTML), findings.
+/// Reason, caveats, attribution, `cards` (HTML of Card()), `about` (HTML), findings.
 [[nodiscard]] std::string VerdictHtml(const ResultView& view, const std::string& cards,
                                       const std::string& about);
 /// Every check, failed ones first; `note` (HTML) says how to read them.

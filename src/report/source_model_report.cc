@@ -307,7 +307,7 @@ Table TrialTable(const SourceModelAudit& audit, bool all) {
 }  // namespace
 
 ReportSection SourceModelSection(const SourceModelAudit& audit, bool verbose) {
-  ReportSection section{.title = "Your own file, run as it is", .link = "File"};
+  ReportSection section{.title = "Your source file, run as it is", .link = "File"};
   section.Add(Paragraph{Sentence(SourceModelSentence(audit)), Paragraph::Look::kReason});
   if (!audit.declined.empty()) return section;
   section.Add(Items{MeasuredLines(audit)});

@@ -35,7 +35,7 @@ struct SourceModelError {
 struct SourceModelCause {
   std::string key;                ///< in summary.json
   std::string title;              ///< in tables
-  std::string meaning;            ///< for people who never heard of it
+  std::string meaning;            ///< in one sentence for those who have not met it
   SourceModelError without = {};  ///< as the file, but for this
   SourceModelError alone = {};    ///< with everything else corrected
 };

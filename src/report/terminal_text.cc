@@ -44,7 +44,8 @@ void TerminalText::Head(const ResultView& view, const std::string& title,
 
 bool TerminalText::Shown(const ShownCheck& check) const {
   const CheckEnd end = EndOf(check);
-  return options_.verbose || check.key || (end != CheckEnd::kOk && end != CheckEnd::kHeld);
+  return options_.verbose || check.key ||
+         (end != CheckEnd::kOk && end != CheckEnd::kByConstruction);
 }
 
 namespace {
@@ -52,7 +53,7 @@ namespace {
 std::string AboutText(const ShownCheck& check) {
   std::string text = WhereOf(check);
   if (check.floored) text += " (floored)";
-  if (!check.blind.empty()) text += " (" + check.blind + ")";
+  if (!check.insensitive.empty()) text += " (" + check.insensitive + ")";
   if (check.stated_limit) {
     text += fmt::format(" (limit by {}, stated {:.1e})", check.limit_by, *check.stated_limit);
   }

@@ -86,7 +86,7 @@ struct MetricRow {
   Metric metric;
   const char* key;      ///< in `checks:` and in check names
   const char* json;     ///< in summary.json's metrics
-  const char* title;    ///< for people
+  const char* title;    ///< shown
   const char* unit;     ///< "m", "rad" or "" for a ratio
   bool of_pair;         ///< compares two witnesses
   MetricLimits limits;  ///< defaults

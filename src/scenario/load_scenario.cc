@@ -116,7 +116,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
         ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s, *mechanism_);
     CheckParameterNames(map);
     if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
-    if (!yaml_.has_errors()) CheckDriveBy(*motion, map.Find("simulation"));
+    if (!yaml_.has_errors()) CheckDriveMode(*motion, map.Find("simulation"));
   }
 
   // Of another kind, nothing else in the file is of use here.
@@ -142,7 +142,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
   // halved where the scenario states none, else a warning.
   void ResolveTables(const YamlNode& motion, const YamlNode* simulation) {
     SimulationSettings& settings = scenario_.simulation;
-    if (!settings.on || !settings.forward || settings.stock_engine || yaml_.has_errors()) return;
+    if (!settings.on || !settings.forward() || settings.stock_engine || yaml_.has_errors()) return;
     const YamlNode* stated = simulation == nullptr ? nullptr : simulation->Find("step_s");
     for (const MotionTable& table : scenario_.motion.tables) {
       const double duration_s = scenario_.motion.duration_s;
@@ -179,7 +179,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     if (!(steps <= kMaxSteps) || std::abs(steps - std::round(steps)) <= 1e-6 * steps) return;
     if (stated && steps < 1.0) return;  // reported later
     const double fitting_s = sample_s / std::ceil(steps - 1e-9);
-    if (stated && scenario_.simulation.on && scenario_.simulation.forward) {
+    if (stated && scenario_.simulation.on && scenario_.simulation.forward()) {
       yaml_.Warn(*simulation->Find("step_s"),
                  fmt::format("simulation.step_s = {} does not divide motion.sample_s = {}: the "
                              "step is {:.6g} s",
@@ -229,12 +229,12 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     CheckSize(motion);
     const SimulationSettings& settings = scenario_.simulation;
     const double steps = scenario_.motion.sample_s / settings.step_s;
-    if (settings.on && settings.forward &&
+    if (settings.on && settings.forward() &&
         !(scenario_.motion.duration_s / settings.step_s <= kMaxSteps)) {
       yaml_.Error(simulation != nullptr ? *simulation : motion,
                   fmt::format("simulation.step_s = {} violates motion.duration_s / step_s <= {:g}",
                               settings.step_s, kMaxSteps));
-    } else if (settings.on && settings.forward &&
+    } else if (settings.on && settings.forward() &&
                std::abs(steps - std::round(steps)) > 1e-6 * steps) {
       yaml_.Error(simulation != nullptr ? *simulation : motion,
                   fmt::format("simulation.step_s = {} violates motion.sample_s = {} = n · step_s",
@@ -265,10 +265,10 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
 
   // Drives that are force-controlled or servos need forces or commands for all DOFs, and the engine
   // whose constraints hold moving loops.
-  void CheckDriveBy(const YamlNode& motion, const YamlNode* simulation) {
+  void CheckDriveMode(const YamlNode& motion, const YamlNode* simulation) {
     const SimulationSettings& settings = scenario_.simulation;
-    if (!settings.on || settings.drive_by == DriveBy::kMotion) return;
-    const bool servo = settings.drive_by == DriveBy::kServos;
+    if (!settings.on || PrescribesMotion(settings.mode)) return;
+    const bool servo = settings.mode == DriveMode::kServo;
     const std::string mode = servo ? "simulation.mode = servo" : "simulation.mode = force_driven";
     if (scenario_.motion.free()) {
       yaml_.Error(*simulation, mode + ": every degree of freedom needs a command",
@@ -298,7 +298,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
   void CheckCommands(const YamlNode& motion) {
     if (scenario_.motion.free()) {
       const SimulationSettings& settings = scenario_.simulation;
-      if (settings.on && !settings.forward) {
+      if (settings.on && !settings.forward()) {
         yaml_.Error(motion, "simulation.mode = inverse, but some degrees of freedom move by forces",
                     "inverse dynamics needs every motion: use mode: forward");
       }
@@ -524,7 +524,7 @@ std::shared_ptr<YamlNode> ValueNode(const SetValue& value, size_t k, YamlReader*
     node = YamlReader(AtOption(value).file).Parse(text);
   }
   if (node != nullptr && !key.empty()) return Relocate(*node, line);
-  reader->AddAt(Severity::kError, line, 0, "the value is no YAML",
+  reader->AddAt(Severity::kError, line, 0, "the value is not YAML",
                 "write --set key=value, e.g. --set simulation.step_s=0.002");
   return nullptr;
 }

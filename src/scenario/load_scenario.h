@@ -52,7 +52,7 @@ class ScenarioMemory;
                                               const ScenarioOptions& options = {});
 
 /// Only the mechanism name, description and `expect:` of a file, even if the rest is wrong. A file
-/// that is no YAML may carry its expectation in a first line "# expect: {…}".
+/// that is not YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
   bool is_scenario = false;    ///< has a `mechanism:` key (or an expectation)
   bool has_witnesses = false;  ///< names programs (scenario/load_scenario.h)

@@ -675,7 +675,7 @@ class MotionReader {
       const auto coordinate = FindCoordinate(AsEntry(*item), "motion.path.outputs");
       if (!coordinate) continue;
       if (CoordinateUnit(mechanism_, *coordinate) != "m") {
-        yaml().Error(*item, fmt::format("motion.path.outputs: {} is no length", item->text),
+        yaml().Error(*item, fmt::format("motion.path.outputs: {} is not a length", item->text),
                      "v_max and a_max are in m/s and m/s²; command angles under motion.commands");
         continue;
       }
@@ -806,10 +806,10 @@ class MotionReader {
       load->p_BoQ_B = output.X_BO.translation();
     }
     if (load->body > 0) return;
-    yaml().Error(
-        node,
-        fmt::format("{}.on = '{}' is no body, frame or output of {}", path, *text, mechanism_.name),
-        DidYouMean(*text, known));
+    yaml().Error(node,
+                 fmt::format("{}.on = '{}' is not a body, frame or output of {}", path, *text,
+                             mechanism_.name),
+                 DidYouMean(*text, known));
   }
 
   ValueReader* values_;

@@ -199,9 +199,9 @@ class ProfileReader : AmountReader {
     for (const double at : *rests) {
       const auto found = std::find(times.begin(), times.end(), at);
       if (found == times.end()) {
-        values_->yaml().Error(*node,
-                              fmt::format("{} = {} is none of times_s", term.PathOf("rests_s"), at),
-                              "rests_s: all rests at every point");
+        values_->yaml().Error(
+            *node, fmt::format("{} = {} is not one of times_s", term.PathOf("rests_s"), at),
+            "rests_s: all rests at every point");
         return {};
       }
       rest[static_cast<size_t>(found - times.begin())] = true;

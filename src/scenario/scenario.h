@@ -46,13 +46,6 @@ struct Extrapolation {
   std::array<double, 2> from{1.0, 0.5};
 };
 
-/// What moves the drives of a forward simulation.
-enum class DriveBy {
-  kMotion,  ///< `mode: forward`: constraints hold them on the commanded motion
-  kForces,  ///< `mode: force_driven`: the drive forces of the equations push in open loop
-  kServos,  ///< `mode: servo`: MuJoCo's actuators follow the commanded motion
-};
-
 /// A servo gain: one number for all drives, or one per drive by name.
 struct Gain {
   std::optional<double> all;
@@ -75,15 +68,17 @@ struct ServoSettings {
 /// The simulation's part.
 struct SimulationSettings {
   bool on = true;
-  bool forward = true;                  ///< time integration; false: inverse dynamics per sample
-  DriveBy drive_by = DriveBy::kMotion;  ///< forward only
-  ServoSettings servo;                  ///< kServos only
-  bool stock_engine = false;            ///< judge MuJoCo as it is instead of the corrected engine
+  DriveMode mode = DriveMode::kPrescribedMotion;
+  ServoSettings servo;         ///< kServo only
+  bool stock_engine = false;   ///< judge MuJoCo as it is instead of the corrected engine
   bool stock_too = false;      ///< forward only: run MuJoCo as it is, too, and report its error
   double step_s = 1e-3;        ///< > 0
   bool ignore_ranges = false;  ///< simulate beyond drive and joint ranges
   Overrides parameters;
   std::optional<Extrapolation> extrapolate;
+
+  /// Integrates in time.
+  [[nodiscard]] bool forward() const { return mode != DriveMode::kInverse; }
 };
 
 /// A program outside that computes the scenario as well (docs/how-to/external_solvers.md).

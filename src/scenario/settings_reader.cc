@@ -144,19 +144,17 @@ Gain ReadGain(ValueReader* values, const YamlNode& node, const std::string& path
   return gain;
 }
 
+// In the order of DriveMode.
 const std::vector<std::string> kModes = {"forward", "inverse", "force_driven", "servo"};
 
 // The mode and what belongs to it.
 void ReadMode(ValueReader* values, YamlMap* map, SimulationSettings* settings) {
   YamlReader& yaml = values->yaml();
   if (const YamlNode* mode = map->Find("mode")) {
-    const auto choice = yaml.Choice(*mode, "simulation.mode", kModes).value_or(0);
-    settings->forward = choice != 1;
-    settings->drive_by = choice == 2   ? DriveBy::kForces
-                         : choice == 3 ? DriveBy::kServos
-                                       : DriveBy::kMotion;
+    const auto choice = yaml.Choice(*mode, "simulation.mode", kModes);
+    if (choice) settings->mode = static_cast<DriveMode>(*choice);
   }
-  if (settings->drive_by == DriveBy::kServos) {
+  if (settings->mode == DriveMode::kServo) {
     if (const YamlNode* kp = map->Required("kp")) {
       settings->servo.kp = ReadGain(values, *kp, "simulation.kp");
     }

@@ -245,7 +245,7 @@ class FiguresReader {
   PlacedText Name(const YamlNode& node, const std::string& path) {
     const PlacedText name = Placed(node, path);
     if (name.given() && !IsName(name.text)) {
-      yaml_.Error(node, fmt::format("{} = '{}' is no name of files", path, name.text),
+      yaml_.Error(node, fmt::format("{} = '{}' is not a name of files", path, name.text),
                   fmt::format("write {}", kNameRule));
     }
     return name;

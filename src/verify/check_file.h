@@ -13,7 +13,7 @@ namespace mbv {
 struct RunOptions;  // verify/run_options.h
 struct RunOutcome;
 
-/// A kind of file that people write. What it has no use for is null or "".
+/// A kind of file that users write. What it has no use for is null or "".
 struct DocumentKind {
   const char* name;  ///< "motion", "stiffness", "study", "model", "mechanism"
   bool (*is)(const std::string& file, const ScenarioHead& head);

@@ -95,25 +95,27 @@ ServoGains GainsOf(const ServoSettings& settings, const Mechanism& mechanism) {
 
 const char* ModeText(const SimulationSettings& settings) {
   if (!settings.on) return "off";
-  if (!settings.forward) return "inverse";
-  switch (settings.drive_by) {
-    case DriveBy::kMotion:
+  switch (settings.mode) {
+    case DriveMode::kInverse:
+      return "inverse";
+    case DriveMode::kPrescribedMotion:
       return "forward";
-    case DriveBy::kForces:
+    case DriveMode::kForceDriven:
       return "force_driven";
-    case DriveBy::kServos:
+    case DriveMode::kServo:
       return "servo";
   }
   return "";
 }
 
 std::string DriveText(const SimulationSettings& settings, const std::string& driven_by) {
-  switch (settings.drive_by) {
-    case DriveBy::kMotion:
+  switch (settings.mode) {
+    case DriveMode::kInverse:
+    case DriveMode::kPrescribedMotion:
       return driven_by + " drive motion";
-    case DriveBy::kForces:
+    case DriveMode::kForceDriven:
       return "driven in open loop by the " + driven_by + " drive forces";
-    case DriveBy::kServos:
+    case DriveMode::kServo:
       return fmt::format("servos on the {} drive motion, kp {}, kv {}, feed-forward: {}", driven_by,
                          GainText(settings.servo.kp), GainText(settings.servo.kv),
                          settings.servo.feedforward ? "its forces" : "none");
@@ -126,13 +128,11 @@ std::string SimulationLine(const Prepared& prepared) {
   const SimulationSettings& simulation = scenario.simulation;
   if (!simulation.on) return "no simulation";
   std::string line =
-      simulation.forward
+      simulation.forward()
           ? fmt::format("forward simulation, step {:g} ms, {} engine", 1e3 * simulation.step_s,
                         simulation.stock_engine ? "stock" : "corrected")
           : std::string("inverse dynamics at each sample");
-  const std::string drives = simulation.forward
-                                 ? DriveText(simulation, prepared.driver().name)
-                                 : std::string(prepared.driver().name) + " drive motion";
+  const std::string drives = DriveText(simulation, prepared.driver().name);
   line +=
       fmt::format(", {}, {:g} s sampled every {:g} ms",
                   scenario.motion.free() ? FreeMotionText(prepared.base, scenario.motion) : drives,

@@ -22,7 +22,7 @@ namespace mbv {
 /// LoadBodies() of the same files.
 [[nodiscard]] LoadedBodies LoadRobotBodies(const std::string& file);
 
-/// Mobility report for people or as JSON, the generated MJCF, URDF or model.yaml, or the
+/// Mobility report to read or as JSON, the generated MJCF, URDF or model.yaml, or the
 /// mechanism.json of foreign witnesses. A model.yaml says what its source left out.
 enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf, kYaml, kMechanism };
 [[nodiscard]] std::string ModelText(const Mechanism& mechanism, ModelFormat format,

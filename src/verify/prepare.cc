@@ -196,8 +196,8 @@ DrivenMotion Prepared::MakeDrivenMotion() const {
 
 DriveForces Prepared::MakeDriveForces() const {
   const SimulationSettings& settings = scenario.simulation;
-  const bool servo = settings.drive_by == DriveBy::kServos && settings.servo.feedforward;
-  if (!settings.forward || (settings.drive_by != DriveBy::kForces && !servo)) return {};
+  const bool servo = settings.mode == DriveMode::kServo && settings.servo.feedforward;
+  if (settings.mode != DriveMode::kForceDriven && !servo) return {};
   if (!has_closed_form()) return ForcesByReference(mechanisms.reference, scenario.motion);
   Diagnostics known;
   ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);

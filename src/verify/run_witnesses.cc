@@ -168,7 +168,7 @@ bool SolvesBesideTable(const Prepared& prepared) {
 }
 
 bool HasServos(const Prepared& prepared) {
-  return prepared.scenario.simulation.drive_by == DriveBy::kServos;
+  return prepared.scenario.simulation.mode == DriveMode::kServo;
 }
 
 }  // namespace
@@ -409,12 +409,12 @@ ComparisonInput InputOf(const Prepared& prepared) {
   return {.mechanism = &prepared.base,
           .motion = &scenario.motion,
           .limits = scenario.checks,
-          .simulation_limits = simulation.forward ? LimitColumn::kForward : LimitColumn::kInverse,
+          .simulation_limits = simulation.forward() ? LimitColumn::kForward : LimitColumn::kInverse,
           .start_window_s = scenario.start_window_s,
           .witnesses = {},
           .driven_by = prepared.driver().name,
           .reactions_not_unique = {},
-          .drive_by = simulation.forward ? simulation.drive_by : DriveBy::kMotion,
+          .mode = simulation.mode,
           .own_parameters = OwnParameters(scenario, prepared.base),
           .left_out = TextsOf(scenario.model_caveats, ModelCaveat::Kind::kLeftOut)};
 }

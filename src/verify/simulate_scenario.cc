@@ -14,15 +14,11 @@ namespace mbv {
 SimulationOptions OptionsOf(const Scenario& scenario, const Mechanism& mechanism, Engine engine) {
   const SimulationSettings& settings = scenario.simulation;
   SimulationOptions options;
-  options.mode = settings.forward ? SimulationMode::kForward : SimulationMode::kInverse;
   options.engine = engine;
   options.step_s = settings.step_s;
-  if (!settings.forward || engine != Engine::kCorrected) return options;
-  if (settings.drive_by == DriveBy::kForces) options.drives = DriveMode::kForceDriven;
-  if (settings.drive_by == DriveBy::kServos) {
-    options.drives = DriveMode::kServo;
-    options.servo = GainsOf(settings.servo, mechanism);
-  }
+  // Other engines are run on the prescribed motion.
+  if (!settings.forward() || engine == Engine::kCorrected) options.mode = settings.mode;
+  if (options.mode == DriveMode::kServo) options.servo = GainsOf(settings.servo, mechanism);
   return options;
 }
 

@@ -1,4 +1,4 @@
-// Structural faults: models of the simulated side with one thing wrong that is no number.
+// Structural faults: models of the simulated side with one thing wrong that is not a number.
 #pragma once
 
 #include <string>

@@ -50,7 +50,7 @@ TEST_F(FilesTest, KeepTheModeOfTheOldOne) {
   EXPECT_EQ(fs::status(file_).permissions(), mode);
 }
 
-// What is no regular file is opened and written; it is there afterwards as it was.
+// What is not a regular file is opened and written; it is there afterwards as it was.
 TEST_F(FilesTest, ThatAreDevicesArePassedThrough) {
   EXPECT_EQ(WriteFile("/dev/null", "gone"), "");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));

@@ -147,7 +147,7 @@ TEST_F(OutputFolderTest, AFileOfTheUserWithANameThatIsNeededIsRefusedByName) {
   Put(root_ / "b" / "snapshots", "x");
   EXPECT_NE(TryResult(root_, "b", "x").find("it holds snapshots"), std::string::npos);
   Put(root_ / "c", "x");
-  EXPECT_NE(TryResult(root_, "c", "x").find("it is no folder"), std::string::npos);
+  EXPECT_NE(TryResult(root_, "c", "x").find("it is not a folder"), std::string::npos);
   EXPECT_EQ(Entries(), 4u);
 }
 
@@ -167,7 +167,7 @@ TEST_F(OutputFolderTest, NamesThatLeadElsewhereAreRefused) {
        {std::string("../victim"), std::string("a/../../victim"), (root_ / "victim").string(),
         std::string(".."), std::string(), std::string("a//b"), std::string("a/"),
         std::string(".hidden"), std::string("a\nb")}) {
-    EXPECT_NE(TryResult(root_ / "out", name, "x").find("this is no name of a result"),
+    EXPECT_NE(TryResult(root_ / "out", name, "x").find("this is not a name of a result"),
               std::string::npos)
         << name;
   }

@@ -145,9 +145,9 @@ TEST(Zip, TheLargeDirectoryIsRefused) {
 TEST(Zip, DamageIsFound) {
   const std::string bytes = Written({{"p/a", "unpacked text"}});
   EXPECT_TRUE(Says(FindingsOf(Replaced(bytes, "unpacked", "unpackEd")), "'p/a' is damaged"));
-  EXPECT_TRUE(Says(FindingsOf(bytes.substr(0, bytes.size() / 2)), "is no ZIP archive"));
-  EXPECT_TRUE(Says(FindingsOf(""), "is no ZIP archive"));
-  EXPECT_TRUE(Says(FindingsOf("PK\x03\x04 and no more"), "is no ZIP archive"));
+  EXPECT_TRUE(Says(FindingsOf(bytes.substr(0, bytes.size() / 2)), "is not a ZIP archive"));
+  EXPECT_TRUE(Says(FindingsOf(""), "is not a ZIP archive"));
+  EXPECT_TRUE(Says(FindingsOf("PK\x03\x04 and no more"), "is not a ZIP archive"));
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ void Loops(benchmark::internal::Benchmark* benchmark) {
   benchmark->Unit(benchmark::kMicrosecond)->Complexity();
 }
 BENCHMARK(Reference)->Apply(Loops);
-BENCHMARK_CAPTURE(Simulation, inverse, {.mode = SimulationMode::kInverse})
+BENCHMARK_CAPTURE(Simulation, inverse, {.mode = DriveMode::kInverse})
     ->Apply(Loops)
     ->UseManualTime()
     ->Iterations(1);

@@ -65,14 +65,15 @@ void BareMjStep(benchmark::State& state, const std::string& scenario) {
 
 const SimulationOptions kForward = {};
 const SimulationOptions kStock = {.engine = Engine::kStock};
-const SimulationOptions kInverse = {.mode = SimulationMode::kInverse};
+const SimulationOptions kInverse = {.mode = DriveMode::kInverse};
 
 const int kRegistered = [] {
-  for (const auto& [name, scenario] :
+  for (const auto& row :
        {std::pair<std::string, std::string>{"platform", "stabilizing_platform/sea_state"},
         {"tripod", "spr_tripod/harmonic"},
         {"scara", "scara_robot/default"},
         {"cabin", "cabin_robot/default"}}) {
+    const std::string &name = row.first, &scenario = row.second;
     const auto add = [&](const std::string& what, const SimulationOptions& options) {
       benchmark::RegisterBenchmark((what + "/" + name).c_str(),
                                    [=](benchmark::State& state) { Run(state, scenario, options); })

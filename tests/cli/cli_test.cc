@@ -57,14 +57,14 @@ TEST_F(CliTest, TheMobilityReportIsJsonToo) {
   EXPECT_EQ(json["bodies"], 13);
   EXPECT_EQ(json["body_coordinates"], 78);
   EXPECT_EQ(json["constraint_rank"], 72);
-  EXPECT_EQ(json["freedoms"], 6);
+  EXPECT_EQ(json["dof"], 6);
   EXPECT_EQ(json["drives"].size(), 6u);
   EXPECT_TRUE(json["redundant_constraints"].empty());
   EXPECT_FALSE(json["home_singular"].get<bool>());
   // A planar loop of four parallel hinges in space: 18 − 20 by counting, 1 in truth, 3 redundant.
   const auto four_bar = nlohmann::json::parse(mbverify("model four_bar --format json").out);
   EXPECT_EQ(four_bar["kutzbach"], -2);
-  EXPECT_EQ(four_bar["freedoms"], 1);
+  EXPECT_EQ(four_bar["dof"], 1);
   EXPECT_EQ(four_bar["home"]["redundant"], 3);
   ASSERT_EQ(four_bar["loops"].size(), 1u);
   EXPECT_EQ(four_bar["loops"][0]["screw_rank"], 3);

@@ -67,7 +67,7 @@ TEST_F(UserFilesTest, NamesOfScenariosFollowTheSameRule) {
     EXPECT_NE(result.err.find("the scenario's name '" + name + "' violates"), std::string::npos)
         << result.err;
   }
-  // A way there that leads back is no part of the name.
+  // A way there that leads back is not a part of the name.
   const std::string there = In("own/../own/turn.yaml").string();
   EXPECT_EQ(mbverify(Run("'" + there + "'")).exit_code, 0);
   EXPECT_TRUE(fs::exists(In("out/own/turn/summary.json")));

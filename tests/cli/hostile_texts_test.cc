@@ -410,7 +410,7 @@ std::string TexTrouble(const std::string& text) {
 }
 
 std::string TroubleOf(Format format, const std::string& out, const std::string& text) {
-  if (FindNonText(out) != std::string::npos) return "what is no text";
+  if (FindNonText(out) != std::string::npos) return "what is not text";
   for (const std::string& mark : kMarks) {
     if (out.find(mark) != std::string::npos) return "the mark " + OneLine(mark);
   }

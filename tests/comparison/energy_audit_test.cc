@@ -169,7 +169,7 @@ struct OnMovingVehicle : OnVehicle {
 
 TEST(EnergyAudit, EnergyOfABaseDoesNotHideADrive) {
   OnMovingVehicle run;
-  EXPECT_EQ(run.Audit().drift.value, 0.0) << "what rounding 1e8 J leaves is no drift";
+  EXPECT_EQ(run.Audit().drift.value, 0.0) << "what rounding 1e8 J leaves is not a drift";
   EXPECT_LT(run.Audit().scale_J, 1e4);
   run.trace.values.col(run.trace.Find("d2.work")) *= 1.5;
   const EnergyAudit audit = run.Audit();

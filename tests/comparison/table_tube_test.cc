@@ -227,7 +227,7 @@ TEST(TableTube, AStatedToleranceWiderThanTheCoarsestVerifiesNothing) {
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
 }
 
-TEST(TableTube, OneColumnWithAWideToleranceIsAReservation) {
+TEST(TableTube, OneColumnWithAWideToleranceIsACaveat) {
   TableCase c;
   c.Print(1e-6);
   c.table.columns[1].tolerance = {.relative = 0.12};  // of 40 N, beside 100 N

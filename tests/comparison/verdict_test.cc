@@ -72,11 +72,11 @@ TEST(Verdict, SwitchedOffChecksNeitherFailNorPass) {
   comparison.checks.resize(5);
   for (size_t k : {0, 1, 3, 4}) comparison.checks[k].limit = 1.0;
   for (size_t k : {0, 3, 4}) comparison.checks[k].pass = true;
-  comparison.checks[4].blind = "wide";
+  comparison.checks[4].insensitive = "wide";
   EXPECT_EQ(comparison.failed(), 1u);
   EXPECT_EQ(comparison.verified(), 2u);
   EXPECT_EQ(comparison.followed(), 0u);
-  EXPECT_EQ(comparison.blind(), 1u);
+  EXPECT_EQ(comparison.insensitive(), 1u);
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ TEST(MechanismCheck, TellsWhatIsBent) {
        [](Edited* m) {
          for (auto& x : (*m)["bodies"][1]["home"]["R"][2]) x = -x.get<double>();
        },
-       "bodies[1].home.R: is no rotation: R Rᵀ − 1 is up to"},
+       "bodies[1].home.R: is not a rotation: R Rᵀ − 1 is up to"},
       {"long",
        [](Edited* m) {
          (*m)["joints"][0]["axis"] = {0, 2, 0};

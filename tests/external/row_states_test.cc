@@ -46,7 +46,7 @@ TEST(RowStates, WhatDoesNotFitIsNoAnswer) {
   const std::string text = kAnswer;
   for (const char* wrong : {"", "{}", "[]", "nonsense"}) {
     EXPECT_FALSE(ReadRowAnswer(wrong, 1, 1, &trouble)) << wrong;
-    EXPECT_NE(trouble.find("rows.json is no answer"), std::string::npos) << trouble;
+    EXPECT_NE(trouble.find("rows.json is not an answer"), std::string::npos) << trouble;
   }
   std::string short_row = text;
   short_row.replace(short_row.find("[1, 2]"), 6, "[1]");

@@ -55,7 +55,7 @@ Answer BySimulation(const Subject& subject, const DrivenSample& driven,
                                        *out = driven;
                                        return RunSummary::Done();
                                      },
-                                     {.mode = SimulationMode::kInverse});
+                                     {.mode = DriveMode::kInverse});
   Answer answer;
   answer.summary = run.summary;
   if (!run.summary.ok()) return answer;

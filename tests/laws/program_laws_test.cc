@@ -22,7 +22,7 @@ class Programs : public ::testing::TestWithParam<std::string> {
     return motion;
   }
 
-  [[nodiscard]] Trace OfSimulation(SimulationMode mode) const {
+  [[nodiscard]] Trace OfSimulation(DriveMode mode) const {
     const Motion motion = Short();
     const auto form = subject().MakeClosedForm();
     CommandSample command;
@@ -57,7 +57,7 @@ TEST_P(Programs, GiveTheSameBitsTwice) {
   EXPECT_TRUE(form.values.allFinite());
   EXPECT_TRUE(Identical(form, closed_form()));
   EXPECT_TRUE(Identical(reference(), reference()));
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     EXPECT_TRUE(Identical(OfSimulation(mode), OfSimulation(mode)));
   }
   // One unit in the last place of one value is a difference.

@@ -65,7 +65,7 @@ struct Case {
     const double steps = scenario.motion.free() ? 10.0 : 30.0;
     Motion& motion = scenario.motion;
     motion.duration_s = std::min(motion.duration_s, steps * motion.sample_s);
-    scenario.simulation.forward = motion.free();
+    scenario.simulation.mode = motion.free() ? DriveMode::kPrescribedMotion : DriveMode::kInverse;
   }
 };
 

@@ -212,10 +212,10 @@ const Slip kElasticSlips[] = {
      "drives.elbow.compliance = -0.02 violates compliance >= 0"},
     {"StiffnessAndCompliance", "stiffness: 5e3", "stiffness: 5e3, compliance: 0",
      "drives.motor has both stiffness and compliance"},
-    {"BeamName", "up: {from", "u.p: {from", "bodies.bracket.beams: 'u.p' is no name"},
+    {"BeamName", "up: {from", "u.p: {from", "bodies.bracket.beams: 'u.p' is not a name"},
     {"BeamKey", "to: C, section", "to: C, color: red, section",
      "bodies.bracket.beams.out: unknown key 'color'"},
-    {"MaterialName", "alloy: {youngs", "al loy: {youngs", "materials: 'al loy' is no name"},
+    {"MaterialName", "alloy: {youngs", "al loy: {youngs", "materials: 'al loy' is not a name"},
 };
 
 INSTANTIATE_TEST_SUITE_P(Slips, BracketWith, testing::ValuesIn(kElasticSlips),
@@ -286,7 +286,7 @@ TEST_F(OtherFiles, ThatAreNoModelsAreReported) {
   const std::string file =
       Write("own.yaml", std::string("name: x\nparameters_from: base.yaml\n") + kRest);
   EXPECT_EQ(LoadModel(file).diagnostics.Text(),
-            file + ":2:18: error: parameters_from = 'base.yaml' is no model file\n");
+            file + ":2:18: error: parameters_from = 'base.yaml' is not a model file\n");
 }
 
 Mechanism LoadElastic(const std::string& name) {

@@ -253,7 +253,7 @@ TEST(CarriedRotors, WhatMeansNothingIsAFinding) {
       "not turn\n  hint: leave gyroscopic out\n");
   EXPECT_EQ(
       ElementFindings("  g: {kind: rotor, joint: slide, inertia: 1, gyroscopic: true}\n"),
-      "m.yaml:10:58: error: elements.g.gyroscopic: the coordinate is no angle about an axis of "
+      "m.yaml:10:58: error: elements.g.gyroscopic: the coordinate is not an angle about an axis of "
       "the joint's parent\n  hint: write axis_on: BODY and axis: [x, y, z] instead\n");
   EXPECT_EQ(
       ElementFindings("  g: {kind: rotor, joint: turn, inertia: 1, axis_on: a}\n"),

@@ -114,7 +114,7 @@ TEST(Expressions, WhatIsRefusedIsToldWhy) {
   Scope scope;
   scope.Define("a", "1");
   const auto said = [&](const std::string& text) { return scope.Evaluate(text).error; };
-  EXPECT_EQ(said("a = 3"), "is no expression: = and \" have no meaning here");
+  EXPECT_EQ(said("a = 3"), "is not an expression: = and \" have no meaning here");
   EXPECT_EQ(said("a += 3"), said("a = 3"));
   EXPECT_EQ(said("a*\"x\""), said("a = 3"));
   EXPECT_EQ(said("a, 2"), "gives several values");
@@ -122,7 +122,7 @@ TEST(Expressions, WhatIsRefusedIsToldWhy) {
   EXPECT_EQ(said("1/0"), "gives inf, a finite number is needed");
   EXPECT_EQ(said("10^31"), "gives 1e+31, which violates |number| <= 1e+30");
   EXPECT_EQ(said("1e999"), "is not a finite number");
-  EXPECT_EQ(said("2 +").substr(0, 18), "is no expression: ");
+  EXPECT_EQ(said("2 +").substr(0, 22), "is not an expression: ");
   const ExpressionResult unknown = scope.Lookup("aa");
   EXPECT_EQ(unknown.error, "there is no parameter 'aa'");
   EXPECT_EQ(unknown.hint, "did you mean 'a'?");

@@ -44,14 +44,14 @@ const Slip kSlips[] = {
      "gravity is a list of 2, a list of 3 is needed"},
     {"WordForFlag", "closure: true", "closure: maybe",
      "joints.C.closure = 'maybe' is neither true nor false"},
-    {"DottedName", "outputs:\n  tool:", "outputs:\n  a.tool:", "outputs: 'a.tool' is no name"},
+    {"DottedName", "outputs:\n  tool:", "outputs:\n  a.tool:", "outputs: 'a.tool' is not a name"},
     {"DuplicateKey", "  rocker:\n", "  crank:\n", "the key 'crank' is already given in line 11"},
     // Numbers.
     {"UnknownSymbol", "crank/2", "cranc/2",
      "m.yaml:13:11: error: bodies.crank.com[0] = 'cranc/2' has the unknown symbol 'cranc'\n"
      "  hint: did you mean 'crank'?"},
     {"UnknownFunction", "crank/2", "hypot3(crank)", "unknown function 'hypot3'"},
-    {"NoExpression", "crank/2", "crank/", "bodies.crank.com[0] = 'crank/' is no expression: "},
+    {"NoExpression", "crank/2", "crank/", "bodies.crank.com[0] = 'crank/' is not an expression: "},
     {"Cycle", "crank: 0.2", "crank: 2*crank",
      "m.yaml:3:10: error: parameters.crank = '2*crank' is a cycle of parameters: crank → crank"},
     {"NotFinite", "crank: 0.2", "crank: 1/0", "parameters.crank = '1/0' gives inf"},
@@ -95,7 +95,7 @@ const Slip kSlips[] = {
     {"ShapeWithoutLength", "to: end, radius", "to: foot, radius",
      "capsule: its ends are the same point"},
     {"ShapeColor", "color: accent", "color: '#12345'",
-     "bodies.crank.shapes[0].color = '#12345' is no color"},
+     "bodies.crank.shapes[0].color = '#12345' is not a color"},
     // Joints.
     {"ZeroAxis", "child: crank.foot, axis: z", "child: crank.foot, axis: [0, 0, 0]",
      "joints.A.axis has the length 0, an axis needs a direction"},

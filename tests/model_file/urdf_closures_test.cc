@@ -124,7 +124,7 @@ TEST(UrdfConstraint, AUniversalJointTakesOneAxisFromEachSide) {
 TEST(UrdfConstraint, FindingsNameTheLineTheValueAndTheRule) {
   EXPECT_EQ(ClosureFindings("<constraint name=\"C\" type=\"hinge\"><parent link=\"rocker\"/>"
                             "<child link=\"coupler\"/></constraint>\n"),
-            "r.urdf:6:1: error: <constraint 'C'>: type = 'hinge' is no kind of closure\n"
+            "r.urdf:6:1: error: <constraint 'C'>: type = 'hinge' is not a kind of closure\n"
             "  hint: fixed, revolute, continuous, prismatic, cylindrical, universal, spherical, "
             "ball or planar\n");
   EXPECT_EQ(ClosureFindings("<constraint name=\"C\" type=\"ball\"><parent link=\"rokcer\"/>"

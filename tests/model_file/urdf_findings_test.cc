@@ -152,7 +152,7 @@ const Wrong kWrongUrdfs[] = {
      "r.urdf:6:1: error: <constraint> has no name\n"},
     {"NoType",
      R"(<constraint name="C"><parent link="rocker"/><child link="coupler"/></constraint>)",
-     "r.urdf:6:1: error: <constraint 'C'>: type = '' is no kind of closure\n"
+     "r.urdf:6:1: error: <constraint 'C'>: type = '' is not a kind of closure\n"
      "  hint: fixed, revolute, continuous, prismatic, cylindrical, universal, spherical, ball or "
      "planar\n"},
     {"NoDirection",

@@ -112,7 +112,7 @@ TEST(UrdfConventions, AMimicThatMeansNothingIsAFinding) {
         mimic + "</joint>");
   };
   EXPECT_EQ(Findings(robot("<mimic joint=\"hipp\"/>")),
-            "r.urdf:3:1: error: joint 'knee': mimic of 'hipp', which is no joint with one "
+            "r.urdf:3:1: error: joint 'knee': mimic of 'hipp', which is not a joint with one "
             "coordinate\n  hint: did you mean 'hip'?\n");
   EXPECT_EQ(Findings(robot("<mimic joint=\"knee\"/>")),
             "r.urdf:3:1: error: joint 'knee': mimic of 'knee', itself\n");

@@ -26,7 +26,7 @@ TEST(YamlReader, ValuesKnowTheirPlace) {
   EXPECT_EQ(deep.column, 12);
 }
 
-// A file that is no map at all is of another kind, and may hold a secret.
+// A file that is not a map at all is of another kind, and may hold a secret.
 TEST(YamlReader, WhatIsNoMapIsNotQuoted) {
   YamlReader reader("token");
   const YamlNodePtr root = reader.Parse("hunter2\n");

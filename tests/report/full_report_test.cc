@@ -30,7 +30,7 @@ TEST(FullReport, SummaryIsAsWritten) {
   ExpectGolden("summary_full.json", Rounded(json).dump(2) + "\n");
 }
 
-TEST(FullReport, TheShortLineTellsReservations) {
+TEST(FullReport, TheShortLineTellsCaveats) {
   const Report report = test::FullReport();
   EXPECT_EQ(VerdictLine(ViewOf(report), {}),
             "two_sliders / full: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  the "
@@ -81,8 +81,8 @@ TEST(FullReport, NothingThatItHoldsGoesUntold) {
       {"caveat", [](F* f) { f->report.comparison.caveats[1].text = "other"; }},
       {"driving", [](F* f) { f->report.comparison.driving = "other"; }},
       {"a check that follows", [](F* f) { LastCheck(f, 0).follows = true; }},
-      {"a check that is blind", [](F* f) { LastCheck(f, 2).blind = "other"; }, {"page"}},
-      {"a check that is not blind", [](F* f) { LastCheck(f, 2).blind = ""; }},
+      {"a check that is insensitive", [](F* f) { LastCheck(f, 2).insensitive = "other"; }, {"page"}},
+      {"a check that is not insensitive", [](F* f) { LastCheck(f, 2).insensitive = ""; }},
       {"a check with a floor", [](F* f) { LastCheck(f, 1).floored = false; }},
       {"a stated limit", [](F* f) { LastCheck(f, 3).stated_limit = 0.5; }, {"page"}},
       {"where a limit is from", [](F* f) { LastCheck(f, 3).limit_by = "other"; }, {"page"}},

@@ -74,7 +74,7 @@ TEST(LoadFigures, OfAJointAreMagnitudesOfWholeVectors) {
   EXPECT_EQ(j.force.time_s, 1.0);
   EXPECT_DOUBLE_EQ(j.force.mean, (7.5 + 10.0) / 3.0);
   EXPECT_DOUBLE_EQ(j.force.rms, std::sqrt((62.5 + 100.0) / 3.0));
-  EXPECT_TRUE(std::isnan(j.moment.peak)) << "one component is no magnitude";
+  EXPECT_TRUE(std::isnan(j.moment.peak)) << "one component is not a magnitude";
   EXPECT_FALSE(j.not_unique);
 }
 

@@ -58,7 +58,7 @@ TEST(Report, JsonHasTheFieldsOthersRelyOn) {
                           "closure_max_m", "power_balance_rel"}) {
     EXPECT_TRUE(metrics.contains(key)) << key;
   }
-  EXPECT_TRUE(metrics["pose_max_m"].is_null());  // a NaN is no number and never passes
+  EXPECT_TRUE(metrics["pose_max_m"].is_null());  // a NaN is not a number and never passes
   for (const char* key : {"analytic_s", "reference_s", "simulation_s", "render_s", "steps"}) {
     EXPECT_TRUE(json["timing"].contains(key)) << key;
   }

@@ -1,4 +1,4 @@
-// What is said about the user's own file.
+// What is said about the source model.
 #include "report/source_model_report.h"
 
 #include <gtest/gtest.h>

@@ -51,7 +51,7 @@ TEST_F(LoadScenarioTest, EverythingLeftOutHasADefault) {
   EXPECT_EQ(scenario.name, "t");
   EXPECT_TRUE(scenario.analytic.on);
   EXPECT_TRUE(scenario.reference.on);
-  EXPECT_TRUE(scenario.simulation.forward);
+  EXPECT_TRUE(scenario.simulation.forward());
   EXPECT_EQ(scenario.simulation.step_s, 1e-3);
   EXPECT_EQ(scenario.start_window_s, 0.0);
   for (const MetricRow& row : MetricRows()) {
@@ -102,7 +102,7 @@ TEST_F(LoadScenarioTest, WitnessesHaveTheirOwnParameters) {
   EXPECT_EQ(scenario.analytic.parameters.at("m_1"), 1600.0);
   EXPECT_EQ(scenario.analytic.as_printed, std::vector<std::string>{"E2"});
   EXPECT_EQ(scenario.reference.parameters.at("L2"), 4.7901);
-  EXPECT_FALSE(scenario.simulation.forward);
+  EXPECT_FALSE(scenario.simulation.forward());
   EXPECT_TRUE(scenario.simulation.stock_engine);
   EXPECT_EQ(scenario.simulation.extrapolate->from[1], 0.25);
   EXPECT_EQ(Merge(scenario.parameters, {{"m_p", 1.0}}).at("m_p"), 1.0);
@@ -173,7 +173,7 @@ TEST_F(LoadScenarioTest, SetReplacesAndAddsValues) {
                                                        {"checks.force_nrmse.inverse", "1e-12"}});
   ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
   EXPECT_EQ(result.scenario->simulation.step_s, 0.0005);
-  EXPECT_FALSE(result.scenario->simulation.forward);
+  EXPECT_FALSE(result.scenario->simulation.forward());
   EXPECT_EQ(result.mechanism->ParameterValue("m_p"), 45000.0);
   EXPECT_DOUBLE_EQ(Evaluate(result.scenario->motion.commands[3].profile, 0.0).value, 3.6);
   EXPECT_EQ(result.scenario->checks[Metric::kForceNrmse].inverse, 1e-12);
@@ -239,7 +239,7 @@ TEST_F(LoadScenarioTest, FindingsAboutSetValuesNameTheOption) {
       "--set parameters.m_q=1: error: models/stabilizing_platform/model.yaml has no parameter "
       "'m_q'\n  hint: did you mean 'm_1'?\n");
   EXPECT_EQ(Messages(Complete(), {{"motion", "{"}}),
-            "--set motion={: error: the value is no YAML\n"
+            "--set motion={: error: the value is not YAML\n"
             "  hint: write --set key=value, e.g. --set simulation.step_s=0.002\n");
   EXPECT_NE(Messages(Complete(), {{"m_p", "4"}})
                 .find("hint: a parameter of the model: --set parameters.m_p=4; known keys: kind"),

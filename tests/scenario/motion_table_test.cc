@@ -176,7 +176,7 @@ TEST_F(MotionTableTest, WrongTablesAreToldWithPlaceAndHint) {
             "  hint: did you mean 'angle'?\n");
   EXPECT_EQ(
       Messages("{table: {csv: a.csv, column: angle, unit: mm}}"),
-      "s.yaml:5:54: error: motion.commands.motor.table.unit: 'mm' is no unit of motor, which is "
+      "s.yaml:5:54: error: motion.commands.motor.table.unit: 'mm' is not a unit of motor, which is "
       "in rad\n"
       "  hint: did you mean 'm'?\n");
   EXPECT_EQ(
@@ -245,7 +245,7 @@ TEST_F(MotionTableTest, WrongLawsAreToldWithPlaceAndHint) {
       "s.yaml:5:28: error: motion.commands.motor.via: 2 times and 1 values violate 2 <= count of "
       "times_s = count of values\n");
   EXPECT_EQ(Messages("{via: {times_s: [0, 1], values: [0, 1], rests_s: [0.5]}}"),
-            "s.yaml:5:61: error: motion.commands.motor.via.rests_s = 0.5 is none of times_s\n"
+            "s.yaml:5:61: error: motion.commands.motor.via.rests_s = 0.5 is not one of times_s\n"
             "  hint: rests_s: all rests at every point\n");
   EXPECT_EQ(Messages("{modified_sin: {duration_s: 1, delta: 1}}"),
             "s.yaml:5:13: error: motion.commands.motor: unknown key 'modified_sin'\n"

@@ -108,7 +108,7 @@ TEST_F(PoseTableTest, WrongFilesAreToldWithPlaceAndHint) {
   WritePoses("q.csv", "qw,qx,qy,qz", [](const Mat3&) { return std::vector<double>{1, 1, 0, 0}; });
   WritePoses("up.csv", "rx,ry,rz", [](const Mat3&) { return std::vector<double>{0, 1.57, 0}; });
   EXPECT_EQ(Messages("{output: platform, csv: q.csv, angles: quaternion}"),
-            "s.yaml:3:39: error: motion.pose_table: q.csv at t = 0 s is no rotation: its length "
+            "s.yaml:3:39: error: motion.pose_table: q.csv at t = 0 s is not a rotation: its length "
             "violates 0.99 … 1.01\n"
             "  hint: are these the right columns?\n");
   EXPECT_EQ(Messages("{output: platform, csv: up.csv, angles: rotation_vector}"),

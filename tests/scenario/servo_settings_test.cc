@@ -32,8 +32,8 @@ TEST(ServoSettings, GainsAreOneNumberOrOnePerDrive) {
   const ScenarioResult one = LoadWith("{mode: servo, kp: 2e5, kv: 100*m_rod, feedforward: forces}");
   ASSERT_TRUE(one.scenario) << one.diagnostics.Text();
   const SimulationSettings& settings = one.scenario->simulation;
-  EXPECT_TRUE(settings.forward);
-  EXPECT_EQ(settings.drive_by, DriveBy::kServos);
+  EXPECT_TRUE(settings.forward());
+  EXPECT_EQ(settings.mode, DriveMode::kServo);
   EXPECT_EQ(settings.servo.kp.Of("leg2"), 2e5);
   EXPECT_EQ(settings.servo.kv.Of("leg2"), 400.0);
   EXPECT_TRUE(settings.servo.feedforward);

@@ -53,7 +53,7 @@ TEST(StateLoads, UnknownNamesAreFindings) {
   EXPECT_NE(
       WithLoad("-stifness*motor.position").diagnostics.Text().find("unknown symbol 'stifness'"),
       std::string::npos);
-  EXPECT_NE(WithLoad("-2*(motor.position").diagnostics.Text().find("is no expression"),
+  EXPECT_NE(WithLoad("-2*(motor.position").diagnostics.Text().find("is not an expression"),
             std::string::npos);
 }
 

@@ -146,14 +146,14 @@ TEST(TableFindings, NotANumberIsRefusedWithLineAndColumn) {
 TEST(TableFindings, TextAndEmptyCellsAreRefusedWithLineAndColumn) {
   const std::string text =
       LoadTable("t,d1.force,d2.force\n0,1,10\n1,two,11\n2,,12\n3,4,13\n4,5,14\n").text;
-  EXPECT_TRUE(Has(text, "t.csv:3:3: error: d1.force = 'two' is no number")) << text;
+  EXPECT_TRUE(Has(text, "t.csv:3:3: error: d1.force = 'two' is not a number")) << text;
   EXPECT_TRUE(Has(text, "t.csv:4:3: error: d1.force: the cell is empty")) << text;
 }
 
 TEST(TableFindings, ThousandsSeparatorsAreExplained) {
   const std::string text =
       LoadTable("t;d1.force\n0;1.5\n1;1,234.5\n2;3.5\n3;4.5\n4;5.5\n5;6.5\n").text;
-  EXPECT_TRUE(Has(text, "t.csv:3:3: error: d1.force = '1,234.5' is no number")) << text;
+  EXPECT_TRUE(Has(text, "t.csv:3:3: error: d1.force = '1,234.5' is not a number")) << text;
   EXPECT_TRUE(Has(text, "without thousands separators")) << text;
 }
 
@@ -175,12 +175,13 @@ TEST(TableFindings, AllOfThemAreGivenAtOnceUpToALimit) {
 TEST(TableFindings, AUnitOfAnotherKindIsRefusedInHeadingAndScenario) {
   const std::string csv = "t,F (mm)\n0,1\n1,2\n2,3\n3,4\n";
   const std::string heading = LoadTable(csv, "{csv: t.csv, columns: {d1.force: F}}").text;
-  EXPECT_TRUE(Has(heading, "t.csv:1:3: error: F (mm): 'mm' is no unit of d1.force, which is in N"))
+  EXPECT_TRUE(
+      Has(heading, "t.csv:1:3: error: F (mm): 'mm' is not a unit of d1.force, which is in N"))
       << heading;
   const std::string stated =
       LoadTable(csv, "{csv: t.csv, columns: {d1.force: {column: F, unit: kNewton}}}").text;
   EXPECT_TRUE(Has(stated,
-                  "s.yaml:1:52: error: reference.columns.d1.force.unit: 'kNewton' is no "
+                  "s.yaml:1:52: error: reference.columns.d1.force.unit: 'kNewton' is not a "
                   "known unit"))
       << stated;
 }

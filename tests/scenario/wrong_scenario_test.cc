@@ -87,7 +87,7 @@ std::vector<Golden> Goldens() {
           "  hint: samples must fall on whole steps")},
       {"UnknownLoadBody", complete("loads: {w: {on: platfrm, force: [0, 0, 1]}}\n"),
        At("16:17",
-          "loads.w.on = 'platfrm' is no body, frame or output of stabilizing_platform\n"
+          "loads.w.on = 'platfrm' is not a body, frame or output of stabilizing_platform\n"
           "  hint: did you mean 'platform'?")},
       {"LoadWithoutForce", complete("loads: {w: {on: platform}}\n"),
        At("16:9", "loads.w has neither force nor moment")},

@@ -42,11 +42,10 @@ double Difference(const SimulationRun& a, const SimulationRun& b, const char* ch
 TEST(SimulatedRotors, AreTheBodyOnItsBearing) {
   const fixtures::CarriedRotor rotor;
   const Mechanism law = Loaded(rotor.AsLaw()), body = Loaded(rotor.AsBody());
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
-    const double tolerance = mode == SimulationMode::kForward ? 1e-6 : 1e-12;
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
+    const double tolerance = mode == DriveMode::kPrescribedMotion ? 1e-6 : 1e-12;
     const SimulationRun a = Simulate(law, TwoSeconds(), TurnThree, {.mode = mode});
-    const SimulationRun b =
-        Simulate(body, TwoSeconds(), TurnThree, {.mode = SimulationMode::kInverse});
+    const SimulationRun b = Simulate(body, TwoSeconds(), TurnThree, {.mode = DriveMode::kInverse});
     ASSERT_TRUE(a.summary.ok()) << a.summary.message;
     ASSERT_TRUE(b.summary.ok()) << b.summary.message;
     for (const char* channel :
@@ -110,8 +109,7 @@ std::string Bushed(const std::string& bushing) {
 TEST(SimulatedBushings, KeepTheBalanceOfPower) {
   const Mechanism m =
       Loaded(Bushed("stiffness: [900, 500, 300, 8, 5, 3], damping: [3, 2, 1, 0.1, 0.2, 0.3]"));
-  const SimulationRun run =
-      Simulate(m, TwoSeconds(), TurnThree, {.mode = SimulationMode::kInverse});
+  const SimulationRun run = Simulate(m, TwoSeconds(), TurnThree, {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const VecX in = SignalOf(run, "power.input");
   EXPECT_LT((in - SignalOf(run, "power.energy_rate")).cwiseAbs().maxCoeff(),
@@ -149,8 +147,8 @@ TEST(SimulatedBushings, AboutAJointsAxisAreAJointsSpring) {
     driven->velocity[2] += 2;
     return summary;
   };
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
-    const double tolerance = mode == SimulationMode::kForward ? 1e-9 : 1e-12;
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
+    const double tolerance = mode == DriveMode::kPrescribedMotion ? 1e-9 : 1e-12;
     const SimulationRun a = Simulate(bushing, TwoSeconds(), small, {.mode = mode});
     const SimulationRun b = Simulate(joint, TwoSeconds(), small, {.mode = mode});
     ASSERT_TRUE(a.summary.ok()) << a.summary.message;

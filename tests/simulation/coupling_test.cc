@@ -24,8 +24,8 @@ RunSummary Turning(double t, DrivenSample* driven) {
 
 TEST(SimulatedCoupling, TorqueIsThatOfTheEquationOfMotion) {
   const CoupledWheels wheels;
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
-    const bool forward = mode == SimulationMode::kForward;
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
+    const bool forward = mode == DriveMode::kPrescribedMotion;
     const SimulationRun run = Simulate(wheels.Make(), FourSeconds(), Turning, {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     EXPECT_TRUE(run.warnings.empty());
@@ -33,7 +33,7 @@ TEST(SimulatedCoupling, TorqueIsThatOfTheEquationOfMotion) {
     CoupledWheels perturbed = wheels;
     perturbed.curve *= 1.0 + 1e-6;
     EXPECT_GT(fixtures::TorqueError(run, Turning, perturbed), 2e-8);
-    // The coupling's moment is no reaction of the hinge.
+    // The coupling's moment is not a reaction of the hinge.
     const int mz = run.trace.Find("two.reaction.mz");
     ASSERT_GE(mz, 0);
     EXPECT_LT(run.trace.values.col(mz).cwiseAbs().maxCoeff(), forward ? 1e-7 : 1e-12);
@@ -56,7 +56,7 @@ TEST(SimulatedCoupling, ASumIsAFixedTendon) {
                          .terms = {{2, 0, {-2.0}}, {0, 0, {1.0}}, {1, 0, {3.0}}},
                          .constant = 2 * 0.5 - 3 * 0.3});
   EXPECT_EQ(mjcf::PlanCoupling(m, m.couplings[1]).type, mjcf::PlannedCoupling::Type::kTendon);
-  const SimulationRun run = Simulate(m, FourSeconds(), Turning, {.mode = SimulationMode::kInverse});
+  const SimulationRun run = Simulate(m, FourSeconds(), Turning, {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   // q3 = (q1 + 3 q2) / 2 + …, q̇3 = −0.1 q̇1: its inertia adds 0.01 · 0.03.
   const CoupledWheels two{.offset = 0.3, .ratio = -0.4, .curve = 0.0};
@@ -73,7 +73,7 @@ TEST(SimulatedCoupling, ASumIsAFixedTendon) {
 TEST(SimulatedCoupling, WhatMuJoCoDoesNotKnowIsToldByName) {
   Mechanism m = CoupledWheels().Make();
   m.couplings[0].terms[0].polynomial = {-1.0, 0.1};
-  const SimulationRun run = Simulate(m, FourSeconds(), Turning, {.mode = SimulationMode::kInverse});
+  const SimulationRun run = Simulate(m, FourSeconds(), Turning, {.mode = DriveMode::kInverse});
   EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
   EXPECT_EQ(run.summary.where, "cam");
   EXPECT_NE(run.summary.message.find("neither linear nor"), std::string::npos);

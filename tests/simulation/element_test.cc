@@ -37,8 +37,8 @@ TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
     RubbingPendulum pendulum;
     pendulum.linear = linear;
     const Mechanism m = pendulum.Make();
-    for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
-      const bool forward = mode == SimulationMode::kForward;
+    for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
+      const bool forward = mode == DriveMode::kPrescribedMotion;
       const SimulationRun run = Simulate(m, Swing(), SwingAt, {.mode = mode});
       ASSERT_TRUE(run.summary.ok()) << run.summary.message;
       EXPECT_TRUE(run.warnings.empty());
@@ -54,7 +54,7 @@ TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
 TEST(SimulatedElements, DryFrictionAtRestLeavesABand) {
   RubbingPendulum p;
   const Mechanism m = p.Make();
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun run = Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     const VecX band = run.trace.values.col(run.trace.Find("motor.force.band"));
@@ -72,7 +72,7 @@ TEST(SimulatedElements, DryFrictionAtRestLeavesABand) {
 TEST(SimulatedElements, APrescribedJointThatRestsHasABand) {
   const Mechanism m = RubbingPendulum().Prescribed();
   const SimulationRun run =
-      Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = SimulationMode::kInverse});
+      Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_NEAR(run.trace.values(1, run.trace.Find("base.force.band")), 0.6, 1e-12);
 }
@@ -86,7 +86,7 @@ RunSummary SpinAt(double t, DrivenSample* driven) {
 
 TEST(SimulatedElements, FrictionByASharedLoadIsRefused) {
   const Mechanism m = fixtures::JournalPendulum().OnTwoHinges();
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun run = Simulate(m, Swing(), SpinAt, {.mode = mode});
     EXPECT_EQ(run.summary.stop, Stop::kUnsupported) << run.summary.message;
     EXPECT_EQ(run.summary.where, "journal");
@@ -97,10 +97,10 @@ TEST(SimulatedElements, FrictionByASharedLoadIsRefused) {
 TEST(SimulatedElements, AJournalRubsByItsRadialLoadOnly) {
   const fixtures::JournalPendulum p;
   const Mechanism m = p.Make();
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun run = Simulate(m, Swing(), SpinAt, {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-    const double limit = mode == SimulationMode::kForward ? 1e-7 : 1e-13;
+    const double limit = mode == DriveMode::kPrescribedMotion ? 1e-7 : 1e-13;
     for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
       EXPECT_NEAR(run.trace.values(row, run.trace.Find("motor.force")),
@@ -119,8 +119,8 @@ RunSummary PushAt(double t, DrivenSample* driven) {
 TEST(SimulatedElements, FrictionByLoadIsThatOfAPushedBlock) {
   const fixtures::PushedBlock block;
   const Mechanism m = block.Make();
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
-    const bool forward = mode == SimulationMode::kForward;
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
+    const bool forward = mode == DriveMode::kPrescribedMotion;
     const SimulationRun run = Simulate(m, Swing(), PushAt, {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     double worst = 0.0, perturbed = 0.0;
@@ -198,7 +198,7 @@ RunSummary ShakenLeg(double t, DrivenSample* driven) {
 
 TEST(SimulatedElements, ActAlongADistanceDrive) {
   const Mechanism m = CartOnALeg();
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun run = Simulate(m, Swing(), ShakenLeg, {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     const int column = run.trace.Find("leg.force");
@@ -209,7 +209,7 @@ TEST(SimulatedElements, ActAlongADistanceDrive) {
       const double force = 6.0 * at.acceleration[0] + 3.0 * at.velocity[0] + 40.0 * (x - 0.3) -
                            2.0 + 0.7 + 5.0 * y * y;
       EXPECT_NEAR(run.trace.values(static_cast<Eigen::Index>(i), column), force,
-                  mode == SimulationMode::kForward ? 1e-6 : 1e-11);
+                  mode == DriveMode::kPrescribedMotion ? 1e-6 : 1e-11);
     }
     const VecX in = run.trace.values.col(run.trace.Find("power.input"));
     const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));

@@ -236,11 +236,11 @@ TEST(SharedDrives, APairSharesATorqueByLeastNormInBothModes) {
         torque / 2.0, (leg.dot(acceleration) + v.squaredNorm() - speed * speed) / length);
     return RunSummary::Done();
   };
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun run = Simulate(m, motion, driven, {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     // Forward, what softness leaves at the start; see the limits of the checks.
-    const double tolerance = mode == SimulationMode::kInverse ? 1e-12 : 1e-6;
+    const double tolerance = mode == DriveMode::kInverse ? 1e-12 : 1e-6;
     EXPECT_NEAR(Column(run, "leg.force")[0], f, tolerance);
     EXPECT_NEAR(Column(run, "motor.force")[0], torque - 0.5 * f, tolerance);
     EXPECT_EQ(run.not_unique.size(), 2u);

@@ -52,7 +52,7 @@ Load TurnOfLeg3(const Mechanism& mechanism, double moment_Nm) {
 TEST(SimulatedIdleSpins, AMomentAboutALineIsToldInInverseMode) {
   SpinningLegs legs;
   legs.motion.loads.push_back(TurnOfLeg3(legs.mechanism, 1e-3));
-  const SimulationRun run = legs.Run({.mode = SimulationMode::kInverse});
+  const SimulationRun run = legs.Run({.mode = DriveMode::kInverse});
   EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
   EXPECT_NE(run.summary.message.find("about the line through both balls of leg3 changes its spin"),
             std::string::npos)
@@ -62,7 +62,7 @@ TEST(SimulatedIdleSpins, AMomentAboutALineIsToldInInverseMode) {
 TEST(SimulatedIdleSpins, WithoutOneTheRunIsWhole) {
   SpinningLegs legs;
   ASSERT_EQ(IdleSpins(legs.mechanism).size(), 6u);
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun run = legs.Run({.mode = mode});
     EXPECT_TRUE(run.summary.ok()) << run.summary.message;
   }

@@ -100,7 +100,7 @@ TEST(ManyLoops, ARegularPoseOfANetIsNoLossOfControl) {
       ASSERT_TRUE(reference.summary.ok())
           << home_deg << ": " << from << " to " << to << ": " << reference.summary.message;
       const SimulationRun inverse =
-          Simulate(net, motion, Commanded(motion), {.mode = SimulationMode::kInverse});
+          Simulate(net, motion, Commanded(motion), {.mode = DriveMode::kInverse});
       ASSERT_TRUE(inverse.summary.ok()) << inverse.summary.message;
       EXPECT_LT(WorstDifference(inverse.trace, reference.trace), 1e-10);
     }
@@ -243,7 +243,7 @@ TEST(FarFrames, OfSpringsOutputsAndFreeJointsSetNoLength) {
   const ReferenceRun near_run = RunReference(mechanism, motion), run = RunReference(far, motion);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_LT(WorstDifference(run.trace, near_run.trace), 1e-8);
-  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun simulated = Simulate(far, motion, Commanded(motion), {.mode = mode});
     ASSERT_TRUE(simulated.summary.ok()) << simulated.summary.message;
     EXPECT_LT(WorstDifference(simulated.trace, run.trace), 1e-7);
@@ -277,7 +277,7 @@ TEST(ManyLoops, TheWitnessesAgreeOnChainsOfFourBars) {
     const ReferenceRun reference = RunReference(mechanism, motion);
     ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
     const SimulationRun inverse =
-        Simulate(mechanism, motion, Commanded(motion), {.mode = SimulationMode::kInverse});
+        Simulate(mechanism, motion, Commanded(motion), {.mode = DriveMode::kInverse});
     ASSERT_TRUE(inverse.summary.ok()) << inverse.summary.message;
     EXPECT_LT(WorstDifference(inverse.trace, reference.trace), 1e-12) << loops;
     const SimulationRun forward = Simulate(mechanism, motion, Commanded(motion), {});
@@ -288,7 +288,7 @@ TEST(ManyLoops, TheWitnessesAgreeOnChainsOfFourBars) {
     Mechanism perturbed = mechanism;
     perturbed.bodies.back().mass *= 1.0 + 1e-6;
     const SimulationRun wrong =
-        Simulate(perturbed, motion, Commanded(motion), {.mode = SimulationMode::kInverse});
+        Simulate(perturbed, motion, Commanded(motion), {.mode = DriveMode::kInverse});
     EXPECT_GT(WorstDifference(wrong.trace, reference.trace), 1e-9) << loops;
   }
 }
@@ -330,7 +330,7 @@ TEST(ManyLoops, FiveHundredLoopsRun) {
   const ReferenceRun reference = RunReference(mechanism, motion);
   ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
   const SimulationRun inverse =
-      Simulate(mechanism, motion, Commanded(motion), {.mode = SimulationMode::kInverse});
+      Simulate(mechanism, motion, Commanded(motion), {.mode = DriveMode::kInverse});
   ASSERT_TRUE(inverse.summary.ok()) << inverse.summary.message;
   EXPECT_LT(WorstDifference(inverse.trace, reference.trace), 1e-10);
 }

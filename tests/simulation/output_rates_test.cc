@@ -73,7 +73,7 @@ TEST(OutputRates, AreTheDerivativesOfTheRecordedPose) {
   for (const bool reversed : {false, true}) {
     const Mechanism m = DrivenZoo(reversed);
     const Motion motion{.duration_s = 0.2, .sample_s = 2e-3, .commands = {}, .loads = {}};
-    const SimulationRun run = Simulate(m, motion, Waves(m), {.mode = SimulationMode::kInverse});
+    const SimulationRun run = Simulate(m, motion, Waves(m), {.mode = DriveMode::kInverse});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     for (const char* c : {"x", "y", "z", "roll", "pitch", "yaw"}) {
       const std::string name = std::string("tip.") + c;
@@ -94,7 +94,7 @@ TEST(OutputRates, AreNoneWhereAnAngleHasNone) {
   const Motion motion{.duration_s = 0.1, .sample_s = 0.01, .commands = {}, .loads = {}};
   const SimulationRun run =
       Simulate(m, motion, fixtures::HoldStill({fixtures::FourBar::kHomeAngle}),
-               {.mode = SimulationMode::kInverse});
+               {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_TRUE(std::isnan(run.trace.values(0, run.trace.Find("tip.yaw.velocity"))));
   EXPECT_EQ(run.trace.values(0, run.trace.Find("tip.x.velocity")), 0.0);

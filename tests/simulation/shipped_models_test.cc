@@ -90,7 +90,7 @@ TEST(ShippedModels, InverseModeAgreesWithTheClosedFormsToRoundOff) {
   for (const Limit& limit : kLimits) {
     Case c(limit.scenario, limit.duration_s);
     const SimulationRun run =
-        Simulate(c.mechanism, c.motion, c.Driven(), {.mode = SimulationMode::kInverse});
+        Simulate(c.mechanism, c.motion, c.Driven(), {.mode = DriveMode::kInverse});
     ASSERT_TRUE(run.summary.ok()) << limit.scenario << ": " << run.summary.message;
     EXPECT_TRUE(run.warnings.empty());
     EXPECT_TRUE(run.not_unique.empty());
@@ -112,7 +112,7 @@ TEST(ShippedModels, AMassWrongByOnePartInAMillionShowsInEveryMode) {
   Case c("spr_tripod/default", 0.3);
   Mechanism perturbed = c.mechanism;
   perturbed.bodies[perturbed.FindBody("platform")].mass *= 1.0 + 1e-6;
-  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+  for (const DriveMode mode : {DriveMode::kPrescribedMotion, DriveMode::kInverse}) {
     const SimulationRun run = Simulate(perturbed, c.motion, c.Driven(), {.mode = mode});
     EXPECT_GT(c.WorstDriveError(run), 1e-7);
   }
@@ -120,7 +120,7 @@ TEST(ShippedModels, AMassWrongByOnePartInAMillionShowsInEveryMode) {
 
 TEST(ShippedModels, MasslessLinksCanBeSimulated) {
   Case c("stabilizing_platform/paper_figures", 1.0);
-  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+  for (const DriveMode mode : {DriveMode::kPrescribedMotion, DriveMode::kInverse}) {
     const SimulationRun run = Simulate(c.mechanism, c.motion, c.Driven(), {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     // Twelve links with 1e-11 of the whole mass (165 t) each, against forces of 50 t.
@@ -151,7 +151,7 @@ TEST(ShippedModels, DependentDrivesMayStartFarFromHomeAndMoveFarFromSampleToSamp
     *at = sample.driven;
     return summary;
   };
-  const SimulationRun run = Simulate(mechanism, motion, driven, {.mode = SimulationMode::kInverse});
+  const SimulationRun run = Simulate(mechanism, motion, driven, {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message << " at " << run.summary.time_s;
   const ReferenceRun reference = RunReference(mechanism, motion);
   for (const char* name : {"motor1.force", "motor2.force", "motor3.force"}) {
@@ -170,7 +170,7 @@ TEST(ShippedModels, AllUniqueReactionsAgreeWithTheReference) {
     const ReferenceRun reference = RunReference(c.mechanism, c.motion);
     ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
     const SimulationRun run =
-        Simulate(c.mechanism, c.motion, c.Driven(), {.mode = SimulationMode::kInverse});
+        Simulate(c.mechanism, c.motion, c.Driven(), {.mode = DriveMode::kInverse});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     int compared = 0;
     for (const Joint& joint : c.mechanism.joints) {

@@ -18,7 +18,7 @@ using fixtures::FourBar;
 Motion OneSecond() { return {.duration_s = 1.0, .sample_s = 0.01, .commands = {}, .loads = {}}; }
 
 // A crank that swings: θ = 1 + 0.5 t + 0.7 sin 3t.
-RunSummary Swing(double t, DrivenSample* driven) {
+RunSummary SwingDrive(double t, DrivenSample* driven) {
   driven->position = VecX::Constant(1, 1.0 + 0.5 * t + 0.7 * std::sin(3 * t));
   driven->velocity = VecX::Constant(1, 0.5 + 2.1 * std::cos(3 * t));
   driven->acceleration = VecX::Constant(1, -6.3 * std::sin(3 * t));
@@ -31,7 +31,7 @@ double TorqueError(const SimulationRun& run, double factor = 1.0) {
   double error = 0.0, size = 0.0;
   for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
     DrivenSample at;
-    (void)Swing(run.trace.time_s[i], &at);
+    (void)SwingDrive(run.trace.time_s[i], &at);
     const double torque =
         factor * FourBar::Torque(at.position[0], at.velocity[0], at.acceleration[0]);
     const double difference = run.trace.values(static_cast<Eigen::Index>(i), column) - torque;
@@ -58,8 +58,8 @@ TEST(FourBarTruth, TorqueAtRestIsTheGradientOfThePotential) {
 
 TEST(Inverse, AgreesWithTheClosedFormToRoundOff) {
   for (const JointKind closing : kClosings) {
-    const SimulationRun run = Simulate(fixtures::MakeFourBar(closing), OneSecond(), Swing,
-                                       {.mode = SimulationMode::kInverse});
+    const SimulationRun run = Simulate(fixtures::MakeFourBar(closing), OneSecond(), SwingDrive,
+                                       {.mode = DriveMode::kInverse});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     EXPECT_TRUE(run.warnings.empty());
     // The closed form's differences are good to 1e-12.
@@ -72,7 +72,7 @@ TEST(Inverse, NoticesAMassThatIsWrongByOnePartInABillion) {
   Mechanism perturbed = fixtures::MakeFourBar();
   perturbed.bodies[2].mass *= 1.0 + 1e-9;
   const SimulationRun run =
-      Simulate(perturbed, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+      Simulate(perturbed, OneSecond(), SwingDrive, {.mode = DriveMode::kInverse});
   EXPECT_GT(TorqueError(run), 1e-11);
 }
 
@@ -114,7 +114,7 @@ constexpr double kTenThousandTurns = 1e-9;
 TEST(Inverse, ACrankTurnsTenThousandTimes) {
   const Turns turns{.turns = 1e4};
   const SimulationRun run = Simulate(fixtures::MakeFourBar(JointKind::kSpherical), turns.Sampled(),
-                                     turns, {.mode = SimulationMode::kInverse});
+                                     turns, {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message << " at " << run.summary.time_s;
   EXPECT_LT(turns.Error(run), kTenThousandTurns);
   EXPECT_LT(Largest(run, "closure.position"), 1e-11);
@@ -125,7 +125,7 @@ TEST(Inverse, ACrankTurnsOnceFromSampleToSample) {
   for (const JointKind kind : {JointKind::kSpherical, JointKind::kRevolute}) {
     const Turns turns{.turns = 5, .samples = 1};
     const SimulationRun run = Simulate(fixtures::MakeFourBar(kind), turns.Sampled(), turns,
-                                       {.mode = SimulationMode::kInverse});
+                                       {.mode = DriveMode::kInverse});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message << " at " << run.summary.time_s;
     EXPECT_LT(turns.Error(run), 1e-12);
   }
@@ -142,7 +142,7 @@ Mechanism TurnedFourBar(double turns) {
 TEST(Inverse, ACrankTurnsOnAfterTenThousandTurns) {
   const Turns turns{.first = 1e4};
   const SimulationRun run =
-      Simulate(TurnedFourBar(1e4), turns.Sampled(), turns, {.mode = SimulationMode::kInverse});
+      Simulate(TurnedFourBar(1e4), turns.Sampled(), turns, {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message << " at " << run.summary.time_s;
   EXPECT_LT(turns.Error(run), kTenThousandTurns);
 }
@@ -180,14 +180,14 @@ TEST(Inverse, NinetyHingesMayCloseLoops) {
   fixtures::AddTree(&m);
   const auto swing = [count](double t, DrivenSample* driven) {
     DrivenSample one_crank;
-    (void)Swing(t, &one_crank);
+    (void)SwingDrive(t, &one_crank);
     driven->position = VecX::Constant(count, one_crank.position[0]);
     driven->velocity = VecX::Constant(count, one_crank.velocity[0]);
     driven->acceleration = VecX::Constant(count, one_crank.acceleration[0]);
     return RunSummary::Done();
   };
   const Motion motion{.duration_s = 0.1, .sample_s = 0.1, .commands = {}, .loads = {}};
-  const SimulationRun run = Simulate(m, motion, swing, {.mode = SimulationMode::kInverse});
+  const SimulationRun run = Simulate(m, motion, swing, {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_TRUE(run.warnings.empty());
   EXPECT_LT(TorqueError(run), 3e-12);
@@ -196,7 +196,7 @@ TEST(Inverse, NinetyHingesMayCloseLoops) {
 TEST(Inverse, AnImpossibleInertiaIsNamedAsWhatMuJoCoRefuses) {
   Mechanism m = fixtures::MakeFourBar();
   m.bodies[2].I_Bcm_B = Vec3(0.01, 0.01, 0.04).asDiagonal();
-  const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+  const SimulationRun run = Simulate(m, OneSecond(), SwingDrive, {.mode = DriveMode::kInverse});
   EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
   EXPECT_EQ(run.summary.where, "coupler");
   EXPECT_NE(run.summary.message.find("MuJoCo cannot follow"), std::string::npos)
@@ -206,7 +206,7 @@ TEST(Inverse, AnImpossibleInertiaIsNamedAsWhatMuJoCoRefuses) {
 TEST(Inverse, RefusesUndrivenFreedoms) {
   Mechanism m = fixtures::MakeFourBar();
   m.joints.pop_back();  // open chain: coupler and rocker swing freely
-  const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+  const SimulationRun run = Simulate(m, OneSecond(), SwingDrive, {.mode = DriveMode::kInverse});
   EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
   EXPECT_NE(run.summary.message.find("2 degrees of freedom"), std::string::npos)
       << run.summary.message;
@@ -216,7 +216,7 @@ TEST(Forward, ConvergesWithFourthOrder) {
   double coarse = 0.0, fine = 0.0;
   for (const auto& [step, error] : {std::pair{0.01, &coarse}, std::pair{0.005, &fine}}) {
     const SimulationRun run =
-        Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.step_s = step});
+        Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {.step_s = step});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     *error = Largest(run, "closure.position");
   }
@@ -229,7 +229,7 @@ TEST(Forward, AgreesWithTheClosedFormAtEveryUsualStep) {
     for (const auto& [step, limit] :
          {std::pair{0.005, 5e-8}, std::pair{0.001, 1e-8}, std::pair{0.0002, 1e-8}}) {
       const SimulationRun run =
-          Simulate(fixtures::MakeFourBar(closing), OneSecond(), Swing, {.step_s = step});
+          Simulate(fixtures::MakeFourBar(closing), OneSecond(), SwingDrive, {.step_s = step});
       ASSERT_TRUE(run.summary.ok()) << run.summary.message;
       EXPECT_LT(TorqueError(run), limit) << step;
     }
@@ -237,14 +237,14 @@ TEST(Forward, AgreesWithTheClosedFormAtEveryUsualStep) {
 }
 
 TEST(Forward, NoticesATorqueThatIsWrongByOnePartInAMillion) {
-  const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {});
   EXPECT_LT(TorqueError(run), 1e-8);
   EXPECT_GT(TorqueError(run, 1.0 + 1e-6), 0.9e-6);
 }
 
 TEST(Forward, StockEngineIsManyTimesWorse) {
   const SimulationRun stock =
-      Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.engine = Engine::kStock});
+      Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {.engine = Engine::kStock});
   ASSERT_TRUE(stock.summary.ok()) << stock.summary.message;
   EXPECT_GT(TorqueError(stock), 1e-4);
   EXPECT_LT(TorqueError(stock), 0.1);
@@ -252,14 +252,15 @@ TEST(Forward, StockEngineIsManyTimesWorse) {
 
 // Gravity puts in what the potential loses.
 TEST(Forward, PowerOfGravityHasItsSignInBothModes) {
-  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
-    const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.mode = mode});
+  for (const DriveMode mode : {DriveMode::kPrescribedMotion, DriveMode::kInverse}) {
+    const SimulationRun run =
+        Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {.mode = mode});
     ASSERT_TRUE(run.summary.ok());
     const VecX power = run.trace.values.col(run.trace.Find("power.gravity"));
     const VecX energy = run.trace.values.col(run.trace.Find("energy.gravity"));
     for (const Eigen::Index i : {10, 50, 90}) {
       DrivenSample at;
-      (void)Swing(run.trace.time_s[static_cast<size_t>(i)], &at);
+      (void)SwingDrive(run.trace.time_s[static_cast<size_t>(i)], &at);
       const double angle = at.position[0], gradient = FourBar::Torque(angle, 0.0, 0.0);
       EXPECT_NEAR(power[i], -gradient * at.velocity[0], 1e-7);
       EXPECT_NEAR(energy[i], FourBar(angle).V(), 1e-7);
@@ -269,7 +270,7 @@ TEST(Forward, PowerOfGravityHasItsSignInBothModes) {
 }
 
 TEST(Forward, PowerOfTheDriveIsTheRateOfEnergy) {
-  const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {});
   const VecX input = run.trace.values.col(run.trace.Find("power.input"));
   const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));
   EXPECT_GT(input.norm(), 1.0);
@@ -280,9 +281,9 @@ TEST(Forward, PowerOfTheDriveIsTheRateOfEnergy) {
 TEST(Forward, ClosureReactionsDoNotDependOnHowTheClosureIsRepresented) {
   // In the plane: split hinge (weld of halves) against ball (connect).
   const SimulationRun split =
-      Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+      Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {.mode = DriveMode::kInverse});
   const SimulationRun ball = Simulate(fixtures::MakeFourBar(JointKind::kSpherical), OneSecond(),
-                                      Swing, {.mode = SimulationMode::kInverse});
+                                      SwingDrive, {.mode = DriveMode::kInverse});
   for (const char* joint : {"A", "B", "C", "D"}) {
     for (const char* c : {".reaction.fx", ".reaction.fy", ".reaction.mz"}) {
       const std::string channel = std::string(joint) + c;
@@ -316,7 +317,7 @@ TEST(Forward, ALoadActsAtItsPointAndInItsAxes) {
   load.in_body_axes = true;
   load.force[1] = Constant(-3.0);
   motion.loads.push_back(load);
-  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+  for (const DriveMode mode : {DriveMode::kPrescribedMotion, DriveMode::kInverse}) {
     const SimulationRun run =
         Simulate(fixtures::MakeFourBar(), motion, fixtures::HoldStill({1.0}), {.mode = mode});
     ASSERT_TRUE(run.summary.ok());
@@ -353,7 +354,7 @@ TEST(Forward, AMomentInBodyAxesTurnsWithItsBody) {
   motion.loads.push_back(load);
   for (const bool in_body_axes : {true, false}) {
     motion.loads[0].in_body_axes = in_body_axes;
-    for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+    for (const DriveMode mode : {DriveMode::kPrescribedMotion, DriveMode::kInverse}) {
       const SimulationRun run = Simulate(m, motion, fixtures::HoldStill({0.3}), {.mode = mode});
       ASSERT_TRUE(run.summary.ok()) << run.summary.message;
       EXPECT_NEAR(run.trace.values(5, run.trace.Find("motor.force")), in_body_axes ? -2.0 : -4.0,
@@ -373,15 +374,15 @@ TEST(Forward, ASpringDamperPullsAndDissipates) {
                        .damping = 5.0,
                        .free_length_m = 0.3});
   DrivenSample at;
-  (void)Swing(0.5, &at);
+  (void)SwingDrive(0.5, &at);
   const double angle = at.position[0], rate = at.velocity[0];
   // Length from the rocker's foot to the crank's tip.
   const double L = std::sqrt(FourBar::d * FourBar::d + FourBar::a * FourBar::a -
                              2 * FourBar::a * FourBar::d * std::cos(angle));
   const double dL = FourBar::a * FourBar::d * std::sin(angle) / L;
   const double pull = 200.0 * (L - 0.3), drag = 5.0 * dL * rate;
-  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
-    const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = mode});
+  for (const DriveMode mode : {DriveMode::kPrescribedMotion, DriveMode::kInverse}) {
+    const SimulationRun run = Simulate(m, OneSecond(), SwingDrive, {.mode = mode});
     ASSERT_TRUE(run.summary.ok());
     const auto half_way = [&](const char* channel) {
       return run.trace.values(50, run.trace.Find(channel));
@@ -435,8 +436,8 @@ TEST(Forward, AFreeTopKeepsItsMomentum) {
 }
 
 TEST(Forward, RunsAreIdentical) {
-  const SimulationRun a = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
-  const SimulationRun b = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun a = Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {});
+  const SimulationRun b = Simulate(fixtures::MakeFourBar(), OneSecond(), SwingDrive, {});
   EXPECT_EQ(a.trace.values, b.trace.values);
   EXPECT_EQ(a.qpos, b.qpos);
 }

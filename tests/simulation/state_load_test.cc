@@ -37,7 +37,7 @@ double At(const SimulationRun& run, size_t i, const std::string& channel) {
 TEST(StateLoads, CountRotationsOfWhatTheyFollowInCommandedMotion) {
   const Mechanism m = MakePivotedBar(0.0);
   const double rate = 6.0 * pi;
-  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+  for (const DriveMode mode : {DriveMode::kPrescribedMotion, DriveMode::kInverse}) {
     for (const Coordinate& coordinate : kAnglesOfBar) {
       Motion motion{.duration_s = 1.0, .sample_s = 0.05, .commands = {}, .loads = {}};
       motion.loads = {SpringOn(coordinate, 3.0)};
@@ -77,13 +77,13 @@ TEST(StateLoads, ThatAreNotFiniteAreNamedInEveryMode) {
     commanded.loads = {NotFiniteBeyond(0.9, infinite)};
     Motion free = FreeMotion(m, 0.3, 6.0, 1.0);
     free.loads = commanded.loads;
-    const auto run = [&](SimulationMode mode, Engine engine) {
+    const auto run = [&](DriveMode mode, Engine engine) {
       return Simulate(m, commanded, Turning(0.3, 1.0), {.mode = mode, .engine = engine}).summary;
     };
     for (const RunSummary& summary :
-         {run(SimulationMode::kForward, Engine::kCorrected),
-          run(SimulationMode::kForward, Engine::kDefaults),
-          run(SimulationMode::kInverse, Engine::kCorrected), RunFree(m, free).summary}) {
+         {run(DriveMode::kPrescribedMotion, Engine::kCorrected),
+          run(DriveMode::kPrescribedMotion, Engine::kDefaults),
+          run(DriveMode::kInverse, Engine::kCorrected), RunFree(m, free).summary}) {
       EXPECT_TRUE(NamesTheLoad(summary, infinite)) << summary.message;
       EXPECT_GT(summary.time_s, 0.05);
     }

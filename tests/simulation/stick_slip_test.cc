@@ -247,7 +247,7 @@ TEST(SimulatedStickSlip, FrictionOnACommandedCoordinateIsItsDrives) {
 TEST(SimulatedStickSlip, PushedInOpenLoopIsRefused) {
   const Mechanism m = StackedBlocks{{2.0}, {CoulombFriction(0.5)}}.Make();
   const Motion motion{.duration_s = 1.0, .sample_s = 0.1, .commands = {}, .loads = {}};
-  SimulationOptions options{.drives = DriveMode::kForceDriven};
+  SimulationOptions options{.mode = DriveMode::kForceDriven};
   options.forces = [](double, VecX* force) {
     *force = VecX::Ones(1);
     return RunSummary::Done();

@@ -79,7 +79,7 @@ inline Report MakeReport(const synthetic::Case& c) {
   return report;
 }
 
-/// What a check of the two sliders says when it is none of the usual ones.
+/// What a check of the two sliders says when it is not one of the usual ones.
 inline CheckResult OddCheck(const std::string& witness, Metric metric, double value) {
   CheckResult check;
   check.name = witness + "." + RowOf(metric).key;
@@ -104,7 +104,7 @@ inline TableColumn Column(const std::string& channel, const std::string& heading
   return column;
 }
 
-/// A motion with everything that a page can show: reservations, an odd one out, a start-up window,
+/// A motion with everything that a page can show: caveats, an odd one out, a start-up window,
 /// checks of all ends, a table in the reference's place, energies, errors of engines, reactions.
 inline Report FullReport() {
   Report report = MakeReport(BentCase());
@@ -128,13 +128,13 @@ inline Report FullReport() {
   CheckResult tube = OddCheck("simulated_vs_reference", Metric::kTableTube, 5e-5);
   tube.stated_limit = 2e-6;
   tube.limit_by = "the table's digits";
-  CheckResult void_check = OddCheck("reference", Metric::kPower, 6e-5);
-  void_check.blind = "nothing moves";
+  CheckResult insensitive_check = OddCheck("reference", Metric::kPower, 6e-5);
+  insensitive_check.insensitive = "nothing moves";
   CheckResult floored = OddCheck("reference", Metric::kClosureM, 7e-5);
   floored.floored = true;
   CheckResult exact = OddCheck("reference", Metric::kEnergy, 0.0);
   exact.channel.clear();
-  for (const CheckResult& check : {tube, void_check, floored, exact}) {
+  for (const CheckResult& check : {tube, insensitive_check, floored, exact}) {
     comparison.checks.push_back(check);
   }
   comparison.table = TableVerdict{

@@ -220,7 +220,7 @@ TEST(WarnNotApplicable, AnElasticModelWithAnotherBeam) {
   const auto json = nlohmann::json::parse(outcome.other->Json());
   EXPECT_EQ(json["caveats"][0]["kind"], "witness_missing");
   EXPECT_EQ(json["caveats"][0]["cause"], "not_applicable");
-  EXPECT_TRUE(json["reservations"][0].get<std::string>().starts_with(text));
+  EXPECT_TRUE(json["caveats"][0]["text"].get<std::string>().starts_with(text));
 }
 
 // Of a robot's file that has more than the model, and of a closed form that is there.

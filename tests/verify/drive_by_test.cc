@@ -111,7 +111,7 @@ TEST(Servo, AStatedLimitOnTheCommandIsJudged) {
     EXPECT_GT(check.value, 1e-4);
   }
   EXPECT_GT(failed, 0u);
-  // Servos sag by themselves; that is no witness' fault.
+  // Servos sag by themselves; that is not a witness' fault.
   EXPECT_EQ(outcome.report->comparison.attribution.odd_one_out, "");
   const RunOutcome wide =
       RunOf("spr_tripod/servo", Short({{"checks.position_m", "{servo: 1e-2}"}}));

@@ -48,7 +48,7 @@ struct Tripod {
   }
 
   [[nodiscard]] Comparison Judge() const {
-    const bool forward = prepared->scenario.simulation.forward;
+    const bool forward = prepared->scenario.simulation.forward();
     return Compare({.mechanism = &prepared->base,
                     .motion = &prepared->scenario.motion,
                     .limits = prepared->scenario.checks,

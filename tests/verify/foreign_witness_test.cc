@@ -102,7 +102,7 @@ TEST(ForeignWitness, ThePendulumIsASmallOne) {
                                      SourcePath("/examples/witness/pendulum.py") + "]}}");
   ASSERT_TRUE(linkage.report);
   EXPECT_EQ(RecordOf(linkage, "pendulum")->summary.message,
-            "not applicable: it is no body on one revolute joint");
+            "not applicable: it is not a body on one revolute joint");
 }
 
 // With four of them every pair stands in a matrix, and a star where it fails.
@@ -167,7 +167,7 @@ void ExpectCaveat(const RunOutcome& outcome, const std::string& witness, Witness
   const std::string line = VerdictLine(ViewOf(*outcome.report), {});
   EXPECT_NE(line.find("; caveat: " + caveat->text), std::string::npos) << line;
   const auto json = nlohmann::json::parse(ToJson(*outcome.report));
-  EXPECT_EQ(json["reservations"].back(), caveat->text);
+  EXPECT_EQ(json["caveats"].back()["text"], caveat->text);
   const auto& value = json["caveats"].back();
   EXPECT_EQ(value["kind"], "witness_missing");
   EXPECT_EQ(value["of"], nlohmann::json::array({witness}));
@@ -223,7 +223,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mischief{"short", "traces.csv:6 has 3 cells for 4 columns", WitnessGap::kBadAnswer},
         Mischief{"untimed", "traces.csv has no column time_s", WitnessGap::kBadAnswer},
         Mischief{"unknown",
-                 "a column 'motr.force', which is no signal of the mechanism (did you "
+                 "a column 'motr.force', which is not a signal of the mechanism (did you "
                  "mean 'motor.force'?)",
                  WitnessGap::kBadAnswer},
         Mischief{"twice", "traces.csv has two columns 'motor.velocity'", WitnessGap::kBadAnswer},

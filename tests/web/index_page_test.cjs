@@ -9,8 +9,8 @@ const {isDeepStrictEqual} = require('node:util');
 
 const {kPatience_ms, launch, openPage, resize} = require('./browser.cjs');
 
-const night = process.env.MBV_NIGHT;
-const index_file = path.join(night, 'index.html');
+const folder = process.env.MBV_REGRESSION;
+const index_file = path.join(folder, 'index.html');
 
 let browser, page;
 const trouble = [], requests = [];
@@ -179,14 +179,14 @@ test('A second run gives each compared scenario a curve of its past', async () =
   assert.match(await page.getAttribute('tbody svg', 'aria-label'), /last 2 runs/);
 });
 
-test('Every report of the run opens without errors and requests nothing but the night\'s script', async () => {
-  const script = fs.readdirSync(night).filter((name) => /^report-[0-9a-f]{16}\.js$/.test(name));
+test('Every report of the run opens without errors and requests nothing but the page\'s script', async () => {
+  const script = fs.readdirSync(folder).filter((name) => /^report-[0-9a-f]{16}\.js$/.test(name));
   assert.equal(script.length, 1, 'one for all reports');
   const links = await page.$$eval('tbody a', (all) => all.map((a) => a.getAttribute('href')).filter(
       (href) => href.endsWith('report.html')));
   assert.ok(links.length >= 4, links.join());
   for (const link of links) {
-    const file = path.join(night, link);
+    const file = path.join(folder, link);
     const found = {trouble: [], requests: []};
     const report = await openPage(browser, file, found);
     await report.waitForSelector('html[data-ready]');
@@ -195,7 +195,7 @@ test('Every report of the run opens without errors and requests nothing but the 
     assert.ok((await report.innerText('.verdict')).includes(word), link);
     assert.deepEqual(found.trouble, [], link);
     assert.deepEqual(found.requests.filter((url) => !url.startsWith('data:')),
-        [file, path.join(night, script[0])].map((name) => pathToFileURL(name).href), link);
+        [file, path.join(folder, script[0])].map((name) => pathToFileURL(name).href), link);
     assert.ok(fs.statSync(file).size < 3e6, link);
     await report.close();
   }

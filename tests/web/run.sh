@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|mesh|night|gate|axe
+# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|mesh|regression|gate|axe
 set -eu
 mbverify=$1 source=$2 work=$3 node=$4 chromium=$5 what=$6
 cd "$source"
@@ -53,7 +53,7 @@ gate)
   exec "$node" tests/web/page_gate.cjs "$work/gate"
   ;;
 axe)
-  # A motion with pictures, a failure, a table, a stiffness, one that could not run, and a night.
+  # A motion with pictures, a failure, a table, a stiffness, one that could not run, and a regression run.
   rm -rf "$work/axe"
   "$mbverify" regress --quiet --no-history --out "$work/axe" --jobs 2 \
     scenarios/four_bar/table_matlab.yaml scenarios/spr_tripod/static.yaml \
@@ -61,10 +61,10 @@ axe)
     scenarios/spr_tripod/must_fail/below_base.yaml scenarios/four_bar/must_fail/wrong_mass.yaml
   exec "$node" tests/web/axe_gate.cjs "$work/axe"
   ;;
-night)
+regression)
   # Agree, disagree, could not run, bad input, one that is not what its file says, and one whose
   # limit becomes too tight after the first of two runs; another is gone then.
-  rm -rf "$work/night" "$work/own"
+  rm -rf "$work/regression" "$work/own"
   mkdir -p "$work/own/scenarios/own"
   own=$work/own/scenarios/own
   sed -e "s|^mechanism:.*|mechanism: $source/models/scara_robot/model.yaml|" -e '/^expect:/d' \
@@ -75,7 +75,7 @@ night)
       scenarios/spr_tripod/static.yaml >"$own/$copy.yaml"
   done
   for run in 1 2; do
-    "$mbverify" regress --quiet --no-pictures --out "$work/night" scenarios/spr_tripod/static.yaml \
+    "$mbverify" regress --quiet --no-pictures --out "$work/regression" scenarios/spr_tripod/static.yaml \
       scenarios/spr_tripod/must_fail/simulated_com.yaml scenarios/spr_tripod/literal.yaml \
       scenarios/stabilizing_platform/must_fail/no_yaml.yaml "$own" \
       >/dev/null && exit 1 || [ $? = 1 ]
@@ -83,9 +83,9 @@ night)
     rm "$own/gone.yaml"
     sed -i 's/inverse: 1.0e-11/inverse: 1.0e-25/' "$own/tight.yaml"
   done
-  MBV_NIGHT=$work/night "$node" --test tests/web/index_page_test.cjs
-  # The page of a red night, with all its boxes.
-  mkdir -p "$work/red_night" && cp "$work/night/index.html" "$work/red_night"
-  exec "$node" tests/web/axe_gate.cjs "$work/red_night"
+  MBV_REGRESSION=$work/regression "$node" --test tests/web/index_page_test.cjs
+  # The page of a red run, with all its boxes.
+  mkdir -p "$work/red_run" && cp "$work/regression/index.html" "$work/red_run"
+  exec "$node" tests/web/axe_gate.cjs "$work/red_run"
   ;;
 esac

@@ -249,7 +249,7 @@ void JointReactions::Add(const Mechanism& mechanism, const char* joint, int pare
       // Along the hinge's axis the loop is redundant.
       entry.component[c] = c < 3 && std::abs(found.axis[c]) < 1e-9;
     } else {
-      // The drive's own component is no reaction.
+      // The drive's own component is not a reaction.
       const bool drive = found.kind == JointKind::kPrismatic  ? c < 3
                          : found.kind == JointKind::kRevolute ? c >= 3
                                                               : false;

@@ -126,7 +126,7 @@ struct VolumeEstimate {
   double value = kNan, error = kNan;
 };
 
-/// Everything a command needs: a text for people, the mesh, and the section curves.
+/// Everything a command needs: a text to read, the mesh, and the section curves.
 struct WorkspaceReport {
   RunSummary summary;
   std::string text;                             ///< plain text, one finding per line

@@ -120,7 +120,7 @@ class StepStudy {
 
   void ReportHeldDrives() {
     const SimulationSettings& settings = prepared_->scenario.simulation;
-    if (!settings.forward || settings.drive_by == DriveBy::kMotion) return;
+    if (PrescribesMotion(settings.mode)) return;
     Finding finding;
     finding.severity = Severity::kWarning;
     finding.file = file_;
@@ -154,7 +154,7 @@ class StepStudy {
   // Inverse mode, which has neither step nor time constant.
   bool RunTruth() {
     SimulatedWitness inverse =
-        Simulate({.mode = SimulationMode::kInverse}, "inverse mode", &driven_, {});
+        Simulate({.mode = DriveMode::kInverse}, "inverse mode", &driven_, {});
     if (!inverse.run.summary.ok()) return Fail("inverse mode: " + inverse.run.summary.message);
     truth_ = std::move(inverse.run.trace);
     truth_forces_ = DriveForceTable(mechanism(), truth_);

@@ -9,7 +9,7 @@
 
 namespace mbv {
 
-/// A table for people.
+/// A table to read.
 [[nodiscard]] std::string ToText(const ConvergenceReport& report);
 /// One row per run, 17 significant digits.
 [[nodiscard]] std::string ToCsv(const ConvergenceReport& report);

@@ -259,7 +259,7 @@ int AddRows(const std::string& file, const RunOptions& options, std::vector<Cros
   if (!outcome.report) {
     SayText(stderr, outcome.diagnostics.Text());
     if (outcome.exit_code == 2) return 2;
-    return Refuse(file + " is no motion", "crosscheck takes scenarios with a motion");
+    return Refuse(file + " is not a motion", "crosscheck takes scenarios with a motion");
   }
   const std::vector<CrosscheckRow> more = CrosscheckRows(*outcome.report);
   rows->insert(rows->end(), more.begin(), more.end());

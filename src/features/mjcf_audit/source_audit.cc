@@ -372,7 +372,7 @@ class Search {
           break;
         }
         if (request_.progress) {
-          request_.progress("settings of your own file",
+          request_.progress("settings of the source model",
                             static_cast<double>(i) / static_cast<double>(candidates_.size()));
         }
         candidate.trial.error = runs_.Run(candidate.settings).error;
@@ -586,7 +586,7 @@ class Auditor {
   }
 
   void Report(double fraction) const {
-    if (request_.progress) request_.progress("your own file", fraction);
+    if (request_.progress) request_.progress("source model", fraction);
   }
 
   void ReportFile(const SourceModelFacts& facts) {

@@ -149,7 +149,7 @@ class SourceModelMaker {
       }
       if (place.joint < 0) {
         return Unsupported(fmt::format(
-            "drive '{}' acts on a degree of freedom that is no hinge or slide of the file",
+            "drive '{}' acts on a degree of freedom that is not a hinge or slide of the file",
             drive.name));
       }
       if (mj_id2name(&m, mjOBJ_JOINT, place.joint) == nullptr) {

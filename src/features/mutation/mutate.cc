@@ -314,8 +314,7 @@ void PerturbationSearch::PerturbFurther(const Perturbable& number, Direction* wa
   }
   for (double size = 10.0 * options_.size; way->unseen < kLargestPerturbation; size *= 10.0) {
     size = std::min(size, kLargestPerturbation);
-    PerturbedRun run =
-        size < kLargestPerturbation ? RunAt(number, way->sign * size) : std::move(largest);
+    PerturbedRun run = size < kLargestPerturbation ? RunAt(number, way->sign * size) : largest;
     if (!run.ran) return;  // the model itself objects; forces have not seen it up to here
     if (run.detected()) {
       const BestCheck best = BestOf(bench_, run);
@@ -849,6 +848,7 @@ std::vector<Perturbable> Chosen(const MutationOptions& options, std::vector<Pert
   if (options.numbers.empty()) return all;
   std::vector<Perturbable> chosen;
   std::vector<std::string> names;
+  names.reserve(all.size());
   for (const Perturbable& number : all) names.push_back(number.name);
   for (const std::string& wanted : options.numbers) {
     const auto found = std::find(names.begin(), names.end(), wanted);
@@ -882,8 +882,8 @@ std::unique_ptr<MutationBench> InverseBench(const MutationBench& own, const std:
                                             const MutationOptions& options,
                                             Diagnostics* diagnostics) {
   const SimulationSettings& simulation = own.scenario().simulation;
-  const bool held = simulation.drive_by == DriveBy::kMotion;
-  if (!simulation.forward || (options.modes != MutationModes::kBoth && held)) return nullptr;
+  const bool held = PrescribesMotion(simulation.mode);
+  if (!simulation.forward() || (options.modes != MutationModes::kBoth && held)) return nullptr;
   Diagnostics findings;
   int ignored = 0;
   auto bench = MutationBench::Make(file, BenchMode::kInverse, &findings, &ignored);

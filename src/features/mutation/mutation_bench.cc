@@ -99,7 +99,7 @@ void MutationBench::RunTruths() {
   if (runner.TakesPart(role::kSolver)) runner.Run(role::kSolver);
   // In open loop the limits of motion are how far wrong forces lead.
   const SimulationSettings& settings = scenario().simulation;
-  if (settings.forward && settings.drive_by == DriveBy::kForces) runner.RunPerturbed();
+  if (settings.mode == DriveMode::kForceDriven) runner.RunPerturbed();
   truths_ = runner.Take();
 }
 

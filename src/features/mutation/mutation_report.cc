@@ -302,7 +302,7 @@ Mutation MutationOf(const JsonValue& json) {
   MutationFields(field, m);
   const std::string word = json.at("kind");
   const auto kind = std::find(std::begin(kKinds), std::end(kKinds), word);
-  if (kind == std::end(kKinds)) json.at("kind").Refuse("is no kind of a number");
+  if (kind == std::end(kKinds)) json.at("kind").Refuse("is not a kind of a number");
   m.kind = static_cast<NumberKind>(kind - std::begin(kKinds));
   m.own = DetectionOf(json.at("own"));
   if (!json.at("inverse").is_null()) m.inverse = DetectionOf(json.at("inverse"));

@@ -203,7 +203,7 @@ class MoreFigureSource {
   FigureSet* set_;
 };
 
-// Those that are wanted; a name that is none of them is bad input.
+// Those that are wanted; a name that is not one of them is bad input.
 void KeepOnly(const std::vector<std::string>& only, FigureSet* set, FigureOutcome* outcome) {
   std::vector<std::string> names;
   for (const Figure& figure : set->figures) names.push_back(figure.name);

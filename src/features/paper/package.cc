@@ -35,7 +35,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kNoDate = "1980-01-01";  // the first that ZIP knows
 
-// "1700000000" → "2023-11-14"; empty of what is no time.
+// "1700000000" → "2023-11-14"; empty of what is not a time.
 std::optional<std::string> DateOfEpoch(const char* text) {
   long long seconds = -1;
   const char* end = text + std::strlen(text);
@@ -384,7 +384,7 @@ class InputReader {
     const std::string path = placer_.PlaceOf(input.file);
     const auto content = ReadWholeFile(input.file);
     if (!content || ContentFingerprint(*content) != input.fingerprint) {
-      return Refuse(input.file, "has changed meanwhile, or is no file that can be read twice",
+      return Refuse(input.file, "has changed meanwhile, or is not a file that can be read twice",
                     "pipes are not packed");
     }
     if (!IsPlainPath(path)) {

@@ -72,7 +72,7 @@ int Package(const PackageArguments& arguments) {
   int exit_code = CheckPackageOut(arguments);
   if (exit_code != 0) return exit_code;
   if (!arguments.date.empty() && !IsDate(arguments.date)) {
-    return Refuse("--date " + arguments.date + " is no date", "for example 2026-11-23");
+    return Refuse("--date " + arguments.date + " is not a date", "for example 2026-11-23");
   }
   const std::vector<std::string> files =
       FilesToRun(arguments.scenarios, {arguments.out, arguments.json.path()}, &exit_code);

@@ -294,7 +294,7 @@ class ManifestReader {
     const std::string path = TextAt(json, key, "");
     if (IsPlainPath(path)) return path;
     Complain(
-        fmt::format("names '{}' as a {}, which is no path in an archive", Printable(path), key));
+        fmt::format("names '{}' as a {}, which is not a path in an archive", Printable(path), key));
     return "";
   }
 

@@ -42,7 +42,7 @@ class PaperReader {
     const std::string path = "figures." + at.key;
     entry.name = {at.key, path, at.line, at.column};
     if (!IsName(at.key)) {
-      yaml_.Error(at, fmt::format("{} is no name of files", path),
+      yaml_.Error(at, fmt::format("{} is not a name of files", path),
                   fmt::format("write {}", kNameRule));
     }
     const YamlMap map(&yaml_, at.value.get(), path, kEntryKeys);

@@ -76,7 +76,7 @@ std::optional<BothTables> CutBoth(const std::string& path, const PackedResults& 
   if (before == packed.end() || now == rerun.end()) return {};
   auto a = CutOwn(before->second), b = CutOwn(now->second);
   if (!a || !b) {
-    *why = "is no table: rows of other lengths than the heading";
+    *why = "is not a table: rows of other lengths than the heading";
   } else if (a->heading != b->heading) {
     *why = "has other columns";
   } else if (a->rows.size() != b->rows.size()) {

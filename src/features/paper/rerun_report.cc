@@ -235,7 +235,7 @@ RerunFile CompareSummaries(const std::string& path, const std::string& packed,
   const SummaryObject before = ParseIfJson<SummaryObject>(packed);
   const SummaryObject now = ParseIfJson<SummaryObject>(rerun);
   if (!before.is_object() || !now.is_object()) {
-    file.why = "is no summary";
+    file.why = "is not a summary";
     return file;
   }
   file.why = FirstDifference(before, now);

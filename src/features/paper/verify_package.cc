@@ -321,7 +321,7 @@ class PackageVerifier {
 
 }  // namespace
 
-// Nothing of the archive is believed: what is no plain ZIP of one folder with a manifest whose
+// Nothing of the archive is believed: what is not a plain ZIP of one folder with a manifest whose
 // checksums hold is a finding, and nothing of it is run.
 VerifyOutcome VerifyPackage(const std::string& file, const VerifyOptions& options) {
   return PackageVerifier(file, options).Verify();

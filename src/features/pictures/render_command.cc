@@ -180,9 +180,9 @@ bool SetCamera(const std::string& camera, ScenarioOptions* options) {
     return error == std::errc() && end == part.data() + part.size() && std::isfinite(value);
   });
   if (!numbers || parts.size() < 2 || parts.size() > 3) {
-    return Refuse(
-               fmt::format("--camera {} is no view and not AZIMUTH,ELEVATION[,DISTANCE]", camera),
-               DidYouMean(camera, ViewNames(), "views: " + Joined(ViewNames()))) == 0;
+    return Refuse(fmt::format("--camera {} is not a view and not AZIMUTH,ELEVATION[,DISTANCE]",
+                              camera),
+                  DidYouMean(camera, ViewNames(), "views: " + Joined(ViewNames()))) == 0;
   }
   for (size_t i = 0; i < parts.size(); ++i) {
     options->set.emplace_back(std::string("snapshots.camera.") + keys[i], parts[i]);

@@ -26,7 +26,7 @@ struct AccuracyCell {
 [[nodiscard]] std::vector<AccuracyCell> AccuracyCells(const std::string& document);
 
 /// What stands in a cell: "1.6e-13", "2.1e-06 m", "1 ms", "inverse"; "–" where it was not measured.
-/// Empty for a heading that is none of AccuracyHeadings() or text that is no summary.
+/// Empty for a heading that is not one of AccuracyHeadings() or text that is not a summary.
 [[nodiscard]] std::optional<std::string> AccuracyText(const std::string& heading,
                                                       const std::string& summary);
 [[nodiscard]] std::vector<std::string> AccuracyHeadings();

@@ -80,7 +80,7 @@ struct CaseResult {
   std::string fingerprint;             ///< of scenario, program and the options that change results
 
   CaseStatus status = CaseStatus::kNotRun;
-  std::string reason = "was not run";  ///< one sentence for people
+  std::string reason = "was not run";  ///< one sentence to read
   std::string verdict = "not_run";
   int exit_code = -1;  ///< of the worker; -1 if it did not end by itself
   int signal = 0;      ///< that ended it
@@ -112,7 +112,8 @@ struct CaseResult {
 /// The first of these that was measured; null if nothing of the kind was compared.
 [[nodiscard]] const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& result);
 
-/// Failed checks with a limit, worst first (value over limit; a value that is no number is worst).
+/// Failed checks with a limit, worst first (value over limit; a value that is not a number is
+/// worst).
 [[nodiscard]] std::vector<const std::pair<const std::string, MetricValue>*> FailedChecks(
     const CaseResult& result);
 

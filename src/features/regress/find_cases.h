@@ -29,8 +29,8 @@ struct FoundCases {
 [[nodiscard]] std::string CaseKey(const std::string& file);
 
 /// Files as given; a folder stands for every scenario below it, must_fail ones included. A file
-/// that names a mechanism counts even if it is no YAML any more, and so does one whose reading ends
-/// the program: it must not silently drop out. Files are read in child processes.
+/// that names a mechanism counts even if it is not YAML any more, and so does one whose reading
+/// ends the program: it must not silently drop out. Files are read in child processes.
 [[nodiscard]] FoundCases FindCases(const std::vector<std::string>& paths);
 
 /// Part `index` (1 … count) of the sorted cases: every count-th, so that neighbours, which cost
@@ -38,7 +38,7 @@ struct FoundCases {
 struct Shard {
   int index = 1, count = 1;
 };
-/// "2/3"; empty when it is no shard.
+/// "2/3"; empty when it is not a shard.
 [[nodiscard]] std::optional<Shard> ParseShard(const std::string& text);
 void KeepShard(const Shard& shard, std::vector<CaseFile>* cases);
 

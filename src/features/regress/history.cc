@@ -425,7 +425,7 @@ std::string CheckHistory(const std::string& path) {
     close(file);
     return "";
   }
-  if (!fs::is_regular_file(path, error)) return fmt::format("history {}: is no file", path);
+  if (!fs::is_regular_file(path, error)) return fmt::format("history {}: is not a file", path);
   if (access(path.c_str(), W_OK) != 0) {
     return fmt::format("history {}: {}", path, std::strerror(errno));
   }

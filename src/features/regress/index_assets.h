@@ -1,4 +1,5 @@
-// The script and the style of index.html, bundled from web/src/night when the program is built.
+// The script and the style of index.html, bundled from web/src/regression when the program is
+// built.
 #pragma once
 
 #include <string_view>

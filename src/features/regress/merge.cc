@@ -106,7 +106,7 @@ void CheckTotal(const std::vector<RunPart>& parts, PartTroubles* troubles) {
 
 }  // namespace
 
-// A run that is no shard is whole by itself. `unfinished`: folders that hold no result.
+// A run that is not a shard is whole by itself. `unfinished`: folders that hold no result.
 PartTroubles FindPartTroubles(const std::vector<RunPart>& parts,
                               const std::vector<std::string>& unfinished) {
   PartTroubles troubles;
@@ -291,7 +291,7 @@ class Merger {
     for (const std::string& note : part->notes) report().notes.push_back(note);
     for (CaseResult& result : part->cases) {
       if (!IsPlainPath(result.key)) {
-        return fmt::format("{}/regress.json: key '{}' is no name of a scenario", from,
+        return fmt::format("{}/regress.json: key '{}' is not a name of a scenario", from,
                            WithoutControls(result.key));
       }
       if (!from_.emplace(result.key, from).second) {

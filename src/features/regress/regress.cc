@@ -303,10 +303,10 @@ struct SummaryText {
   std::string reason;
   std::string culprits;  ///< failed checks and where witnesses broke down, one per line
   bool judged = true;    ///< anything was asked; a study may ask nothing
-  std::string damage;    ///< why it is none of ours
+  std::string damage;    ///< why it is not one of ours
 };
 
-SummaryText SummaryOf(const JsonValue& json, CaseResult* result) {
+SummaryText ReadSummary(const JsonValue& json, CaseResult* result) {
   SummaryText words;
   words.reason = Word(json, "reason");
   words.judged = json.value("judged", true);
@@ -345,10 +345,10 @@ SummaryText SummaryOf(const JsonValue& json, CaseResult* result) {
   return words;
 }
 
-// What a summary.json says of `result`, which stays as it was if it is none of ours.
+// What a summary.json says of `result`, which stays as it was if it is not one of ours.
 SummaryText ReadSummary(const std::string& text, CaseResult* result) {
   CaseResult read = *result;
-  auto words = ReadJson(text, [&](const JsonValue& json) { return SummaryOf(json, &read); });
+  auto words = ReadJson(text, [&](const JsonValue& json) { return ReadSummary(json, &read); });
   if (!words) {
     SummaryText damaged;
     damaged.damage = "summary.json: " + words.refusal.Text();

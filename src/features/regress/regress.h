@@ -45,7 +45,7 @@ struct RegressOptions {
   const volatile std::sig_atomic_t* stop = nullptr;  ///< not 0: stop the workers and return
 };
 
-/// What runs now and what is done, for people who watch.
+/// What runs now and what is done, for a terminal.
 struct RegressProgress {
   std::function<void(size_t cases, size_t kept)> begin;
   std::function<void(const std::string& key)> started;

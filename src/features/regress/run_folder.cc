@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFilesSchema = "mbverify.night/1";
+constexpr const char* kFilesSchema = "mbverify.run_files/1";
 
 bool IsThere(const fs::path& path) {
   std::error_code error;
@@ -38,7 +38,7 @@ bool IsThere(const fs::path& path) {
 
 }  // namespace
 
-fs::path RunFolder::Own() const { return out_ / kStateFolder / "night"; }
+fs::path RunFolder::Own() const { return out_ / kStateFolder / "regress"; }
 
 RunFolder::~RunFolder() {
   if (lock_ < 0) return;
@@ -107,11 +107,11 @@ std::string RunFolder::Claim(const std::vector<std::string>& names) {
   }
   // Runs of versions that kept no list.
   const auto report = ReadWholeFile(out_ / "regress.json");
-  const bool night = report && ReportFromJson(*report).has_value();
+  const bool ours = report && ReportFromJson(*report).has_value();
   std::string trouble;
   for (const std::string& name : names) {
     MBV_DEMAND(IsPlainPath(name), name);
-    if (!claimed_.contains(name) && !night && IsThere(out_ / name)) {
+    if (!claimed_.contains(name) && !ours && IsThere(out_ / name)) {
       trouble += fmt::format(
           "{}{}: error: is there already and mbverify did not write it; move it away, or choose "
           "another --out",
@@ -144,7 +144,7 @@ std::string RunFolder::Begin(const std::string& started_utc) const {
                 "are of the run before.\n`mbverify regress --resume` with the same --out "
                 "goes on with it; without --resume it starts anew.\n",
                 started_utc));
-  // The page of the run before is what people open.
+  // The page of the run before is what a reader opens.
   std::string page = ReadWholeFile(out_ / "index.html").value_or("");
   const size_t at = page.find(kIndexMain);
   if (!trouble.empty() || at == std::string::npos || page.find(kUnfinished) != std::string::npos) {

@@ -39,10 +39,10 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// What KeyMetric() is: "drive force error, RMS"; "" without one.
 [[nodiscard]] std::string KeyTitle(const CaseResult& result);
 /// "2.8e-11 of 1.0e-09 (simulated vs analytic)", "2.8e-11 of 1.0e-09 (stiffness, simulated vs
-/// analytic)": the key metric for people; "" if there is none.
+/// analytic)": the key metric as text; "" if there is none.
 [[nodiscard]] std::string KeyText(const CaseResult& result);
 
-/// Smaller copy of a PNG as a data URI, at most `width_px` wide; "" if it is no PNG.
+/// Smaller copy of a PNG as a data URI, at most `width_px` wide; "" if it is not a PNG.
 [[nodiscard]] std::string ThumbnailUri(const std::string& png, int width_px);
 
 }  // namespace mbv

@@ -155,7 +155,7 @@ class Initialiser {
       if (starter.name == options_.from) return &starter;
       names.emplace_back(starter.name);
     }
-    Add(fmt::format("--from {} is none of {}", options_.from, fmt::join(names, ", ")),
+    Add(fmt::format("--from {} is not one of {}", options_.from, fmt::join(names, ", ")),
         DidYouMean(options_.from, names));
     return nullptr;
   }
@@ -170,7 +170,7 @@ class Initialiser {
   void CheckFolder(const fs::path& into) {
     std::error_code error;
     if (!fs::exists(into, error) || fs::is_directory(into, error)) return;
-    Add(fmt::format("--into {} is no folder", into.string()), "");
+    Add(fmt::format("--into {} is not a folder", into.string()), "");
   }
 
   void WriteFromFile(const fs::path& model, const fs::path& scenario) {

@@ -36,7 +36,7 @@ int AddScenario(const std::string& file, const RunOptions& options, Sized* sized
   SayText(stderr, outcome.diagnostics.Text());
   if (!outcome.report) {
     if (outcome.exit_code == 2) return 2;
-    return Refuse(file + " is no motion", "size takes scenarios with a motion");
+    return Refuse(file + " is not a motion", "size takes scenarios with a motion");
   }
   const Report& report = *outcome.report;
   if (!sized->mechanism.empty() && sized->mechanism != report.mechanism) {

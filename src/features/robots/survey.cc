@@ -174,8 +174,8 @@ Verdict VerdictOf(const std::vector<SurveyRow>& rows) {
 }
 
 const std::vector<std::string> kSurveyColumns = {
-    "file",    "status",        "bodies",        "loops",   "freedoms", "redundant", "gap_m",
-    "gap_rad", "inverse_nrmse", "forward_nrmse", "seconds", "caveats",  "message"};
+    "file",    "status",        "bodies",        "loops",   "dof",     "redundant", "gap_m",
+    "gap_rad", "inverse_nrmse", "forward_nrmse", "seconds", "caveats", "message"};
 
 }  // namespace
 
@@ -198,7 +198,7 @@ std::string SurveyJson(const std::vector<SurveyRow>& rows) {
                       {"status", row.status},
                       {"bodies", count(row.bodies)},
                       {"loops", count(row.loops)},
-                      {"freedoms", count(row.dofs)},
+                      {"dof", count(row.dofs)},
                       {"redundant", count(row.redundant)},
                       {"gap_m", Number(row.gap_m)},
                       {"gap_rad", Number(row.gap_rad)},
@@ -325,6 +325,7 @@ bool IsModel(const std::string& file) {
 
 std::vector<InputFile> RobotFiles(const std::vector<std::string>& files) {
   std::vector<InputFile> inputs;
+  inputs.reserve(files.size());
   for (const std::string& file : files) inputs.push_back({file, ""});
   return inputs;
 }

@@ -29,7 +29,7 @@ namespace {
 constexpr double kBytes = 8.0, kPoseBytes = 128.0;  // of a number, of a body's pose
 constexpr double kMegabyte = 1e6;
 
-// "" when the scenario is no motion, or cannot be read either.
+// "" when the scenario is not a motion, or cannot be read either.
 std::string WhatIsLarge(const std::string& file, const ScenarioOptions& options) {
   try {
     const ScenarioResult loaded = LoadScenario(file, options);

@@ -189,7 +189,7 @@ std::vector<std::string> SharedDrives(const Mechanism& mechanism, const Motion& 
   return shared;
 }
 
-// Sentences for people. `simulated`: drives and prescribed joints that MuJoCo's rows leave open at
+// Sentences. `simulated`: drives and prescribed joints that MuJoCo's rows leave open at
 // the last sample, where a pose may have taken a constraint away that is there at home.
 std::vector<std::string> SharedForceTexts(const Mechanism& mechanism,
                                           const std::vector<std::string>& drives,
@@ -337,8 +337,8 @@ class ScenarioRun {
   void RunErrorMeasures(WitnessRunner* runner) {
     const auto& simulation = runner->runs().simulation;
     if (!simulation || !simulation->summary.ok()) return;
-    if (scenario().simulation.drive_by == DriveBy::kMotion) RunOtherEngines(*runner);
-    if (scenario().simulation.drive_by == DriveBy::kForces) runner->RunPerturbed();
+    if (PrescribesMotion(scenario().simulation.mode)) RunOtherEngines(*runner);
+    if (scenario().simulation.mode == DriveMode::kForceDriven) runner->RunPerturbed();
   }
 
   // The simulator's own modelling error: the same run by the other engines.
@@ -346,7 +346,7 @@ class ScenarioRun {
     const SimulationSettings& settings = scenario().simulation;
     if (scenario().motion.free()) RunStockFriction(runner);
     // Its error is stated in drive forces, which a free motion does not compare.
-    if (scenario().motion.free() || !settings.forward || !settings.stock_too) return;
+    if (scenario().motion.free() || !settings.forward() || !settings.stock_too) return;
     for (const Engine engine : {Engine::kDefaults, Engine::kStock, Engine::kCorrected}) {
       EngineRun& run = other_engines_.emplace_back();
       run.engine = engine;

@@ -350,7 +350,7 @@ class Parser {
       if (coordinate.ends_with(component)) ends.push_back(coordinate);
     }
     if (ends.size() == 1) return ends[0];
-    Error(fmt::format("'{}' is no coordinate of the pose", name),
+    Error(fmt::format("'{}' is not a coordinate of the pose", name),
           DidYouMean(name, known, fmt::format("coordinates: {}", fmt::join(known, ", "))));
     return "";
   }
@@ -364,7 +364,7 @@ class Parser {
     for (const std::string& word : SplitAt(value, ":")) {
       const auto number = PlainNumber(word);
       if (!number || !std::isfinite(*number)) {
-        Error(fmt::format("{} = {} is no number or range", key, value));
+        Error(fmt::format("{} = {} is not a number or range", key, value));
         return;
       }
       numbers.push_back(*number);
@@ -376,7 +376,7 @@ class Parser {
     } else if (numbers.size() == 3 && !within) {
       AddRange(name, value, numbers, unit);
     } else {
-      Error(fmt::format("{} = {} is no LOW:HIGH:POINTS", key, value));
+      Error(fmt::format("{} = {} is not LOW:HIGH:POINTS", key, value));
     }
   }
 

@@ -70,7 +70,7 @@ struct MapResult {
     const StiffnessMap& map, const MapResult& result, const std::string& mechanism,
     const std::vector<std::string>& names, Diagnostics* diagnostics);
 
-/// Median, smallest and largest value of each index with its place, for people.
+/// Median, smallest and largest value of each index with its place, to read.
 [[nodiscard]] std::string MapText(const StiffnessMap& map, const MapResult& result,
                                   const std::vector<std::string>& names);
 

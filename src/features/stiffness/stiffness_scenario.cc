@@ -80,7 +80,7 @@ RandomLoads ReadRandom(ValueReader* values, const YamlNode& node) {
     *value = NotNegative(values, *number, map.PathOf(key)).value_or(*value);
   }
   if (random.force_max == 0.0 && random.moment_max == 0.0) {
-    yaml.Error(node, "loads.random: force_max = moment_max = 0 is no load");
+    yaml.Error(node, "loads.random: force_max = moment_max = 0 is not a load");
   }
   return random;
 }
@@ -95,7 +95,7 @@ Vec6 ReadWrench(ValueReader* values, const YamlNode& node, const std::string& pa
     wrench.head<3>() = values->Vector(*moment, path + ".moment").value_or(Vec3::Zero());
   }
   if (map.valid() && !values->yaml().has_errors() && wrench.isZero(0.0)) {
-    values->yaml().Error(node, path + " is no load", "give force and/or moment");
+    values->yaml().Error(node, path + " is not a load", "give force and/or moment");
   }
   return wrench;
 }

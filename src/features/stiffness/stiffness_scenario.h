@@ -43,7 +43,7 @@ struct StiffnessScenario : Scenario {
   double force_N = 1000.0, moment_Nm = 100.0;
   bool compare_printed = false;  ///< the paper's own model, too: stated, never judged
   std::vector<Vec6> loads;       ///< [m; f], about the output's origin, world axes
-  std::string loads_text;        ///< where they come from, for people
+  std::string loads_text;        ///< where they come from, to read
 };
 
 struct StiffnessScenarioResult {

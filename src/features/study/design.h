@@ -141,7 +141,7 @@ struct StudyLimit {
   std::optional<double> below, above;
   double share = 0.0;  ///< 0 … 1
 
-  /// A value that is no number keeps no limit.
+  /// A value that is not a number keeps no limit.
   [[nodiscard]] bool Keeps(double value) const {
     return value == value && !(below && value >= *below) && !(above && value <= *above);
   }

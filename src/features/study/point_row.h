@@ -20,9 +20,9 @@ struct PointRow {
 
 /// "point,seed,exit,reason,…": names of factors and quantities.
 [[nodiscard]] std::string PointHeader(const Study& study);
-/// One line with its end; numbers in 17 digits, nothing for what is no number.
+/// One line with its end; numbers in 17 digits, nothing for what is not a number.
 [[nodiscard]] std::string PointLine(const PointRow& row, const Study& study);
-/// Reads such a line (without its end) back; empty if it is none of this study.
+/// Reads such a line (without its end) back; empty if it is not a row of this study.
 [[nodiscard]] std::optional<PointRow> ReadPointLine(std::string_view line, const Study& study);
 
 }  // namespace mbv

@@ -176,7 +176,7 @@ class ShardMerger {
       std::optional<Finding> damage;
       const auto identity = ReadIdentity(folder, &damage);
       if (damage) return damage;
-      if (!identity) return refused(folder, "is no result of a study");
+      if (!identity) return refused(folder, "is not a result of a study");
       if (first_ && identity->fingerprint != first_->fingerprint) {
         return refused(folder,
                        fmt::format("is of another study than {}, or of other files", folders[0]));

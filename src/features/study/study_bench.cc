@@ -200,7 +200,8 @@ void StudyBench::Measure(const Prepared& prepared, const StudyRun& run, Diagnost
     forces_ = ForcesOf(trace, nullptr);
     return;
   }
-  steps_ = run.witnesses.front()->name == role::kSimulated && prepared.scenario.simulation.forward;
+  steps_ =
+      run.witnesses.front()->name == role::kSimulated && prepared.scenario.simulation.forward();
   const AlignedTable table = TableOf(prepared);
   forces_ = ForcesOf(trace, &table.trace);
   measured_ = MeasureForces(table, run, forces_, *study_.validation);

@@ -76,7 +76,7 @@ int PrintStudy(const StudyArguments& arguments, const std::string& file,
   return exit_code;
 }
 
-// A word that is no file but nearly a command; "" where there is none.
+// A word that is not a file but nearly a command; "" where there is none.
 std::string MisspeltCommand(const std::vector<std::string>& words) {
   std::error_code error;
   const bool file = words.empty() || std::filesystem::exists(FindScenario(words[0]), error);

@@ -487,7 +487,7 @@ class StudyReader {
     study_.name = *name;
     if (IsName(*name)) return;
     const std::string near = NearestName(*name);
-    yaml_.Error(node, fmt::format("study = '{}' is no name: {}", *name, kNameRule),
+    yaml_.Error(node, fmt::format("study = '{}' is not a name: {}", *name, kNameRule),
                 near.empty() ? "" : "e.g. " + near);
   }
 
@@ -600,7 +600,7 @@ class StudyReader {
     for (const YamlEntry& entry : yaml_.Entries(node, "limits")) {
       const auto found = std::find(names.begin(), names.end(), entry.key);
       if (found == names.end()) {
-        yaml_.Error(entry, fmt::format("limits: '{}' is none of the quantities", entry.key),
+        yaml_.Error(entry, fmt::format("limits: '{}' is not one of the quantities", entry.key),
                     DidYouMean(entry.key, names, "name it under quantities, too"));
         continue;
       }
@@ -715,7 +715,7 @@ class PointList {
       finding.file = file_;
       finding.line = line.number;
       finding.column = there ? cut.cells[columns_[k]].column : 1;
-      finding.message = fmt::format("'{}' is no number of {}",
+      finding.message = fmt::format("'{}' is not a number of {}",
                                     there ? cut.cells[columns_[k]].text : "", factors_[k].name);
       if (findings_->findings().size() < 20) findings_->Add(std::move(finding));
     }
@@ -735,7 +735,8 @@ std::uint64_t ReadCount(ValueReader* values, const YamlNode& node, const std::st
   if (*number >= 1.0 && *number <= 0x1p53 && *number == std::floor(*number)) {
     return static_cast<std::uint64_t>(*number);
   }
-  values->yaml().Error(node, fmt::format("{} = {:g} is no whole number from 1 on", path, *number));
+  values->yaml().Error(node,
+                       fmt::format("{} = {:g} is not a whole number from 1 on", path, *number));
   return 1;
 }
 
@@ -744,7 +745,7 @@ void CheckPower(const YamlNode& node, const std::string& path, std::uint64_t cou
                 YamlReader* yaml) {
   if (std::has_single_bit(count)) return;
   const std::uint64_t below = std::bit_floor(count);
-  yaml->Error(node, fmt::format("{} = {} is no power of two", path, count),
+  yaml->Error(node, fmt::format("{} = {} is not a power of two", path, count),
               fmt::format("{} or {}: only these leave no part of a range out", below, 2 * below));
 }
 
@@ -848,6 +849,7 @@ std::optional<Correlation> ReadCorrelation(ValueReader* values, const YamlNode& 
     return {};
   }
   std::vector<std::string> names;
+  names.reserve(factors.size());
   for (const Factor& factor : factors) names.push_back(factor.name);
   std::vector<size_t> axes;
   for (const YamlNode* item : *items) {

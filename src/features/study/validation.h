@@ -29,7 +29,7 @@ struct DriveValidation {
   std::vector<double> u_val;                                         ///< per sample
   double error_mean = kNan, error_rms = kNan, measured_rms = kNan;   ///< of E and D
   double u_num = kNan, u_input = kNan, u_data = kNan, level = kNan;  ///< RMS; level: of u_val
-  size_t outside = 0;        ///< samples with |E| > k u_val, and those that are no number
+  size_t outside = 0;        ///< samples with |E| > k u_val, and those that are not a number
   const char* largest = "";  ///< which part makes most of u_val²
   double share = 0.0;        ///< that may be outside
 
@@ -42,7 +42,7 @@ struct DriveValidation {
 struct StudyValidationResult {
   std::vector<DriveValidation> drives;
   std::string table;      ///< file name of the measured forces
-  std::string numerical;  ///< where u_num is from, for people
+  std::string numerical;  ///< where u_num is from, to read
   std::string trouble;    ///< why there is no result; "" if there is one
 
   [[nodiscard]] bool pass() const;

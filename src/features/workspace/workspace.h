@@ -16,7 +16,7 @@ namespace mbv {
 struct WorkspaceOutcome {
   RunSummary summary;       ///< kUnsupported when the mechanism has no workspace computation
   Diagnostics diagnostics;  ///< parameters that do not suit it
-  std::string text;         ///< findings for people
+  std::string text;         ///< findings to read
   std::vector<WorkspaceMeasure> measures;
   bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content

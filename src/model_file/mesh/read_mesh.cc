@@ -78,7 +78,7 @@ std::vector<fs::path> InPackage(const std::string& package, const fs::path& rest
   return paths;
 }
 
-// What people name as FOLDER/… or SCHEME://NAME/….
+// What files name as FOLDER/… or SCHEME://NAME/….
 std::vector<fs::path> Candidates(const std::string& name, const fs::path& folder) {
   for (const char* scheme : {"package://", "model://"}) {
     if (!name.starts_with(scheme)) continue;
@@ -200,7 +200,7 @@ class NoFiles : public Assimp::IOSystem {
 };
 
 // Of a PLY file, whose header promises counts: it must end, and what follows must hold them, or the
-// library reads on without an end. "" if it does, or is no PLY file.
+// library reads on without an end. "" if it does, or is not a PLY file.
 class PlyCheck {
  public:
   explicit PlyCheck(const std::string& bytes) : bytes_(bytes) {}

@@ -51,7 +51,7 @@ struct MeshText {
 /// library may crash on hostile files: see ReadMeshFiles().
 [[nodiscard]] MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension);
 
-/// A surface of a file that is read by several people is there once.
+/// A surface of a file that is named in several places is there once.
 struct MeshFile {
   std::shared_ptr<const TriangleMesh> surface;  ///< in the file's numbers; null: `trouble`
   std::string trouble;

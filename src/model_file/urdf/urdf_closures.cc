@@ -116,10 +116,11 @@ class ClosureReader {
     const char* type = element.Attribute("type");
     const auto kind = KindOf(type == nullptr ? "" : type);
     if (!kind) {
-      Error(element,
-            fmt::format("{}: type = '{}' is no kind of closure", Where(element), type ? type : ""),
-            "fixed, revolute, continuous, prismatic, cylindrical, universal, spherical, ball or "
-            "planar");
+      Error(
+          element,
+          fmt::format("{}: type = '{}' is not a kind of closure", Where(element), type ? type : ""),
+          "fixed, revolute, continuous, prismatic, cylindrical, universal, spherical, ball or "
+          "planar");
     }
     closure->joint.kind = kind.value_or(JointKind::kFixed);
   }

@@ -68,7 +68,7 @@ struct UrdfPluginRow {
 };
 [[nodiscard]] std::span<const UrdfPluginRow> UrdfPluginRows();
 
-/// Reads them; findings carry the line. Empty if the text is no XML (urdfdom says so).
+/// Reads them; findings carry the line. Empty if the text is not XML (urdfdom says so).
 [[nodiscard]] UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
                                           Diagnostics* diagnostics);
 

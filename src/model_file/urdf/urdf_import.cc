@@ -291,7 +291,8 @@ class Importer {
       }
       const std::string says = fmt::format("joint '{}': mimic of '{}'", mimic.joint, mimic.of);
       if (!Contains(names, mimic.of)) {
-        Error(line, says + ", which is no joint with one coordinate", DidYouMean(mimic.of, names));
+        Error(line, says + ", which is not a joint with one coordinate",
+              DidYouMean(mimic.of, names));
       } else if (!Contains(names, mimic.joint)) {
         Error(line, says + ", but it has no coordinate of its own to couple");
       } else if (mimic.of == mimic.joint) {

@@ -81,7 +81,7 @@ bool HasForeignOperator(const std::string& text) {
 
 constexpr const char* kSeveralValues = "gives several values";
 
-std::string NoExpression(const std::string& why) { return "is no expression: " + why; }
+std::string NoExpression(const std::string& why) { return "is not an expression: " + why; }
 
 void Prepare(const std::string& text, const std::map<std::string, double>& constants,
              mu::Parser* parser) {
@@ -305,7 +305,7 @@ Scope::Constants Scope::ConstantsOf(const std::string& expression,
   };
   if (expression.size() > kMaxExpression) return refuse("is too long for an expression", "");
   if (HasForeignOperator(expression)) {
-    return refuse("is no expression: = and \" have no meaning here", "");
+    return refuse("is not an expression: = and \" have no meaning here", "");
   }
   Constants constants;
   const std::shared_ptr<Expression> known = ExpressionOf(expression);

@@ -1,4 +1,4 @@
-// Units that people write at the end of a name: `guess_deg`, `value_mm`, `--set length_mm=9`.
+// Units at the end of a name: `guess_deg`, `value_mm`, `--set length_mm=9`.
 #pragma once
 
 #include <functional>

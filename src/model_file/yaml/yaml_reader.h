@@ -56,7 +56,7 @@ struct YamlNode {
 /// The value of `text` if it is a plain decimal number ("0.2", "1e-3", "-4", also ".inf", ".nan").
 [[nodiscard]] std::optional<double> PlainNumber(std::string_view text);
 
-/// Offset of the first byte that is no UTF-8 text (control characters included), or npos.
+/// Offset of the first byte that is not UTF-8 text (control characters included), or npos.
 [[nodiscard]] size_t FindNonText(const std::string& text);
 
 /// Parses and reads one file; collects its findings (each once, at most kMaxFindings).
@@ -119,7 +119,7 @@ class YamlReader {
 /// A map whose keys are known.
 class YamlMap {
  public:
-  /// Reports a node that is no map and every key that is not in `keys`. A null node is an empty
+  /// Reports a node that is not a map and every key that is not in `keys`. A null node is an empty
   /// map. `path` is the key's path for messages; "" for the whole file. A whole file is of another
   /// kind, and nothing of it is shown or read, if it has unknown keys and either more of them than
   /// known ones, or no known one that says more than `name`, `version` and the like.
@@ -162,7 +162,7 @@ class YamlMap {
 
 }  // namespace mbv
 
-// Why a text is no YAML, in the words of who wrote it. Internal to input/.
+// Why a text is not YAML, in the words of who wrote it. Internal to input/.
 
 namespace mbv::internal {
 

@@ -113,7 +113,7 @@ constexpr const char* kMat73Header = "MATLAB 7.3 MAT-file, written by mbverify";
 constexpr hsize_t kUserBlock = 512;
 constexpr const char* kRefs = "#refs#";
 
-// UTF-8 → UTF-16; what is no UTF-8 becomes U+FFFD.
+// UTF-8 → UTF-16; what is not UTF-8 becomes U+FFFD.
 std::vector<std::uint16_t> Utf16(const std::string& text) {
   std::vector<std::uint16_t> letters;
   for (size_t i = 0; i < text.size();) {

@@ -171,7 +171,7 @@ class Mapper {
       mapping_.time_factor = unit->factor;
       return;
     }
-    const std::string message = fmt::format("'{}' is no unit of time", text);
+    const std::string message = fmt::format("'{}' is not a unit of time", text);
     const std::string hint = UnitHint(text, "s");
     failed_ = true;
     if (in_columns) {
@@ -297,9 +297,9 @@ class Mapper {
       return;
     }
     failed_ = true;
-    const std::string message = unit ? fmt::format("'{}' is no unit of {}, which is in {}", text,
+    const std::string message = unit ? fmt::format("'{}' is not a unit of {}, which is in {}", text,
                                                    mapped->column.channel.name, si)
-                                     : fmt::format("'{}' is no known unit", text);
+                                     : fmt::format("'{}' is not a known unit", text);
     const std::string hint = UnitHint(unit ? "" : text, si);
     if (stated) {
       yaml_->AddAt(Severity::kError, mapped->settings->unit_line, mapped->settings->unit_character,

@@ -72,7 +72,7 @@ class Loader {
     }
   }
 
-  // A column; a time is no signal.
+  // A column; a time is not a signal.
   TableColumnSettings& AddColumn(const std::string& path, const std::string& signal,
                                  const std::string& unit, const YamlNode& place) {
     if (!unit.empty()) {
@@ -388,7 +388,7 @@ class PoseLoader {
                    where + " pitches beyond 89°, where roll and yaw are not distinguishable",
                    "turn the output's frame");
     } else {
-      yaml().Error(settings_.place, where + " is no rotation: its length violates 0.99 … 1.01",
+      yaml().Error(settings_.place, where + " is not a rotation: its length violates 0.99 … 1.01",
                    "are these the right columns?");
     }
     return false;

@@ -52,7 +52,7 @@ void ReadColumnName(ValueReader* values, const YamlNode& node, const std::string
     return;
   }
   if (*number < 1 || *number > double{kMaxTableColumns} || *number != std::floor(*number)) {
-    values->yaml().Error(node, fmt::format("{} = {} is no column number", path, *text),
+    values->yaml().Error(node, fmt::format("{} = {} is not a column number", path, *text),
                          "columns are counted from 1; put a heading that is a number in quotes");
     return;
   }
@@ -333,7 +333,7 @@ class RowReader {
         return;
       case CellNumber::Kind::kText:
         Add(line.number, cell.column,
-            fmt::format("{} = '{}' is no number", NameOf(k), Shown(cell.text)),
+            fmt::format("{} = '{}' is not a number", NameOf(k), Shown(cell.text)),
             TextHint(cell.text));
         return;
     }

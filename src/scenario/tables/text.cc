@@ -257,7 +257,7 @@ bool IsUnitRow(const CutLine& cut) {
   return filled > 0 && 2 * units >= filled;
 }
 
-// "F1 (kN)", "v (m/s)", "F1/kN" or "a/(m/s^2)" → name, unit; what is no unit stays in the name.
+// "F1 (kN)", "v (m/s)", "F1/kN" or "a/(m/s^2)" → name, unit; what is not a unit stays in the name.
 void SplitHeading(TableHeading* heading) {
   const std::string_view full = Trim(heading->full);
   heading->name = full;
@@ -398,7 +398,7 @@ size_t FindFirstRow(const std::vector<TableLine>& lines, const TableFormat& form
 bool IsReadable(std::string_view text, const std::string& file, Diagnostics* diagnostics) {
   const bool utf16 = text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF");
   if (utf16 || text.find('\0') != std::string_view::npos) {
-    AddError(file, 0, utf16 ? "is UTF-16 text" : "holds zero bytes, so it is no text",
+    AddError(file, 0, utf16 ? "is UTF-16 text" : "holds zero bytes, so it is not text",
              "save it as CSV or as UTF-8 text", diagnostics);
     return false;
   }

@@ -15,7 +15,7 @@ struct TableUnit {
 };
 
 /// The unit written in `text`: "kN", "(newton)", "[N*mm]", "mm/s^2", "deg/sec**2", "rpm"; products
-/// by `*`, `·`, `-`, `.` or a space, quotients by `/`. Empty when it is no unit that is known.
+/// by `*`, `·`, `-`, `.` or a space, quotients by `/`. Empty when it is not a unit that is known.
 [[nodiscard]] std::optional<TableUnit> FindUnit(std::string_view text);
 
 /// "did you mean 'kN'?" for a misspelt unit, else the list of units of the kind `si` ("" for all).

@@ -232,7 +232,7 @@ void ClosureSolver::SolveForces(const VecX& tau) {
 void ClosureSolver::RemoveSelfStress(VecX* force) {
   if (redundant() == 0) return;
   const VecX& unit = system_->row_unit();
-  if (undriven() == 0) {  // J x next to the force: rounding in x is no self-stress
+  if (undriven() == 0) {  // J x next to the force: rounding in x is not a self-stress
     system_->FillScaledTranspose(&columns_here_);
     if (least_here_.Factor(columns_here_, kRankTolerance)) {
       const VecX x = least_here_.LeastSquares(force->cwiseProduct(unit), 0);

@@ -369,8 +369,8 @@ namespace {
 // A closure open by more than this part of the mechanism's extent has come apart.
 constexpr double kApart = 0.01;
 
-RunSummary ComeApart(Session* s, const std::string& what, double t_s) {
-  s->came_apart = true;
+RunSummary Diverged(Session* s, const std::string& what, double t_s) {
+  s->diverged = true;
   return {.stop = Stop::kEngineFailure,
           .message = fmt::format("{} at t = {:.6g} s", what, t_s),
           .time_s = t_s,
@@ -382,7 +382,7 @@ RunSummary ComeApart(Session* s, const std::string& what, double t_s) {
 // Home to the first driven sample, with consistent velocities and accelerations.
 RunSummary PutAtStart(Session* s, const DrivenSample& first) {
   if (s->motion.free()) return PutAtFreeStart(s, first);
-  if (s->options.drives != DriveMode::kPrescribedMotion) return PutAtCommandedStart(s, first);
+  if (!PrescribesMotion(s->options.mode)) return PutAtCommandedStart(s, first);
   if (RunSummary summary = CloseAtStart(s->motion, first, &s->system, &s->solver, &s->run->notes);
       !summary.ok()) {
     summary.time_s = 0.0;
@@ -447,7 +447,7 @@ RunSummary CheckSample(Session* s, double largest_gap_m, double t_s) {
   if (!s->loads.trouble().ok()) return s->loads.trouble();
   const ConstraintSystem::Gap gap = s->system.LargestGap();
   if (gap.position_m < largest_gap_m) return TroubleAt(*s, t_s);
-  return ComeApart(
+  return Diverged(
       s, fmt::format("loop-closure error of {:.3g} m in the simulation", gap.position_m), t_s);
 }
 
@@ -496,7 +496,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
       integrator.RungeKutta(h, middles[i], ends[i], step.from_s);
     }
     if (!s->loads.trouble().ok()) return s->loads.trouble();
-    if (!integrator.healthy()) return ComeApart(s, "the simulated motion diverged", step.to_s);
+    if (!integrator.healthy()) return Diverged(s, "the simulated motion diverged", step.to_s);
     if (!friction.acts()) s->work.Step(h, step.uniform == 4, s->WorkRates());
     if (step.sample < 0) continue;
     s->Record(static_cast<size_t>(step.sample));
@@ -558,8 +558,8 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     }
     if (data->warning[mjWARN_BADQACC].number > 0 || data->warning[mjWARN_BADQPOS].number > 0 ||
         data->warning[mjWARN_BADQVEL].number > 0) {
-      return ComeApart(s, "MuJoCo reset the simulation, which had diverged",
-                       static_cast<double>(n) * h);
+      return Diverged(s, "MuJoCo reset the simulation, which had diverged",
+                      static_cast<double>(n) * h);
     }
   }
   clock.Stop(s->run);

@@ -137,8 +137,8 @@ struct Session {
   EngineState start;      ///< of a mechanism whose drives are force-controlled or servos
   bool shared = false;    ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
-  VecX given;               ///< forces that the driven coordinates are given
-  bool came_apart = false;  ///< the run ended because numbers or loops did not hold
+  VecX given;             ///< forces that the driven coordinates are given
+  bool diverged = false;  ///< the run ended because numbers or loops did not hold
   static constexpr Eigen::Index kBlock = 16;
   MatX records, qpos_records;      ///< samples that are not yet in the run: a column each
   Eigen::Index kept = 0, put = 0;  ///< how many, and how many are in the run

@@ -38,7 +38,7 @@ class LeastForces {
 
 // Only the corrected engine's states are of one instant.
 bool Integrates(const SimulationOptions& options) {
-  return options.mode == SimulationMode::kForward && options.engine == Engine::kCorrected;
+  return options.mode != DriveMode::kInverse && options.engine == Engine::kCorrected;
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ void Session::Record(size_t i) {
     const LoadFriction load_friction(this);
     const LeastForces least(this);
     const HeldShares shares(this);
-    if (options.mode != SimulationMode::kInverse) system.EvaluateBodyForces();
+    if (options.mode != DriveMode::kInverse) system.EvaluateBodyForces();
     const Eigen::Map<Eigen::RowVectorXd> record(records.col(kept).data(), records.rows());
     recorder.Record(loads, work.work(), record, &run->X_WB[i]);
     if (recorder.has_bands()) recorder.RecordBands(Bands(), record);
@@ -166,10 +166,10 @@ void Session::ApplyForces(double t_s, const Commanded& at) {
   for (const DriveForce& force : motion.forces) {
     given[force.drive] = Evaluate(force.force, t_s).value;
   }
-  if (options.drives == DriveMode::kForceDriven) given.head(at.force.size()) = at.force;
-  if (options.drives == DriveMode::kServo) RunServos(engine, at, data.get(), &given);
+  if (options.mode == DriveMode::kForceDriven) given.head(at.force.size()) = at.force;
+  if (options.mode == DriveMode::kServo) RunServos(engine, at, data.get(), &given);
   system.SetGivenForces(given);
-  if (options.drives != DriveMode::kServo) system.AddGivenForces(data->qfrc_applied);
+  if (options.mode != DriveMode::kServo) system.AddGivenForces(data->qfrc_applied);
 }
 
 // MuJoCo's actuation stage at the data's position (tendons evaluated) and velocity. The motors
@@ -214,7 +214,7 @@ void AdvancePositions(const EngineModel& engine, double h, const VecX& mean, con
 namespace {
 
 RunSummary RunMode(Session* session, const DrivenMotion& driven) {
-  if (session->options.mode == SimulationMode::kInverse) return RunInverse(session, driven);
+  if (session->options.mode == DriveMode::kInverse) return RunInverse(session, driven);
   if (session->options.engine == Engine::kCorrected) return RunCorrected(session, driven);
   return RunStock(session, driven);
 }
@@ -233,8 +233,8 @@ MjcfOptions MjcfOptionsOf(const Motion& motion, const SimulationOptions& options
   MjcfOptions mjcf{.step_s = AdjustedStep(motion, options.step_s),
                    .time_constant_steps = options.stock_time_constant_steps,
                    .default_softness = options.engine == Engine::kDefaults,
-                   .prescribed = options.drives == DriveMode::kPrescribedMotion};
-  if (options.drives == DriveMode::kServo) {
+                   .prescribed = PrescribesMotion(options.mode)};
+  if (options.mode == DriveMode::kServo) {
     mjcf.kp.assign(options.servo.kp.begin(), options.servo.kp.end());
     mjcf.kv.assign(options.servo.kv.begin(), options.servo.kv.end());
   }
@@ -243,7 +243,7 @@ MjcfOptions MjcfOptionsOf(const Motion& motion, const SimulationOptions& options
 
 RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMotion& driven,
                const SimulationOptions& options, const std::function<void(double)>& progress,
-               SimulationRun* run, bool* came_apart) {
+               SimulationRun* run, bool* diverged) {
   run->mjcf = WriteMjcf(mechanism, MjcfOptionsOf(motion, options));
   EngineModel engine;
   if (RunSummary summary = MakeEngineModel(mechanism, run->mjcf, &engine); !summary.ok()) {
@@ -254,7 +254,7 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   SetRestRates(motion.duration_s, &engine);
   ReleaseForcedDrives(motion, &engine);
   EngineState start;
-  if (options.drives != DriveMode::kPrescribedMotion) {
+  if (!PrescribesMotion(options.mode)) {
     DrivenSample first;
     if (RunSummary summary = driven(0.0, &first); !summary.ok()) return summary;
     if (RunSummary summary = FindCommandedStart(motion, first, &engine, &start, &run->notes);
@@ -263,10 +263,9 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
     }
     PrescribeDrives(false, &engine);
   }
-  if (options.drives == DriveMode::kServo) FindServos(&engine);
+  if (options.mode == DriveMode::kServo) FindServos(&engine);
   const bool own_events = options.engine == Engine::kCorrected;
-  if (RunSummary summary = CheckElements(engine, motion, options.drives, own_events);
-      !summary.ok()) {
+  if (RunSummary summary = CheckElements(engine, motion, options.mode, own_events); !summary.ok()) {
     return summary;
   }
   if (motion.free() || IsReleased(engine)) {
@@ -279,19 +278,19 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   session.progress = progress;
   RunSummary summary = RunMode(&session, driven);
   if (summary.ok()) ReportUniqueness(session, run);
-  *came_apart = session.came_apart;
+  *diverged = session.diverged;
   return summary;
 }
 
-// Where a corrected run has come apart, what a quarter of its step does tells whether the step or
+// Where a corrected run has diverged, what a quarter of its step does tells whether the step or
 // the model is to blame.
 std::string WithQuarterStep(const Mechanism& mechanism, const Motion& motion,
                             const DrivenMotion& driven, SimulationOptions options,
                             const std::function<void(double)>& progress) {
   options.step_s = 0.25 * AdjustedStep(motion, options.step_s);
   SimulationRun run;
-  bool came_apart = false;
-  const RunSummary summary = Run(mechanism, motion, driven, options, progress, &run, &came_apart);
+  bool diverged = false;
+  const RunSummary summary = Run(mechanism, motion, driven, options, progress, &run, &diverged);
   if (summary.ok()) {
     return fmt::format("; simulation.step_s = {:.3g} follows the motion to its end",
                        options.step_s);
@@ -326,10 +325,9 @@ SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion, const D
   {
     simulation::EngineSession session(&run.warnings);
     try {
-      bool came_apart = false;
-      run.summary =
-          simulation::Run(mechanism, motion, driven, options, progress, &run, &came_apart);
-      if (came_apart && options.engine == Engine::kCorrected) {
+      bool diverged = false;
+      run.summary = simulation::Run(mechanism, motion, driven, options, progress, &run, &diverged);
+      if (diverged && options.engine == Engine::kCorrected) {
         run.summary.message +=
             simulation::WithQuarterStep(mechanism, motion, driven, options, progress);
       }

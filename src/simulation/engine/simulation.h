@@ -13,19 +13,10 @@
 
 namespace mbv {
 
-enum class SimulationMode { kForward, kInverse };
 enum class Engine {
   kCorrected,  ///< J̇q̇ and exact drive references supplied (see docs/explanation/simulation.md)
   kStock,      ///< MuJoCo as it is, by the best recipe from outside (stiff, rates in the targets)
   kDefaults,   ///< MuJoCo as it is by default: soft constraints, positions as targets
-};
-
-/// What moves the drives in forward mode.
-enum class DriveMode {
-  kPrescribedMotion,  ///< constraints hold them on the commanded motion; the force is the
-                      ///< constraint's
-  kForceDriven,       ///< given forces drive them in open loop, from the commanded start
-  kServo,             ///< MuJoCo's own position and velocity actuators follow the commanded motion
 };
 
 /// Forces of all drives, in model order [N or N m], at any time of the scenario.
@@ -37,7 +28,8 @@ struct ServoGains {
 };
 
 struct SimulationOptions {
-  SimulationMode mode = SimulationMode::kForward;
+  /// kForceDriven and kServo: the corrected engine, and every DOF commanded.
+  DriveMode mode = DriveMode::kPrescribedMotion;
   Engine engine = Engine::kCorrected;
   double step_s = 1e-3;  ///< integration step, > 0; samples fall on whole steps
   /// Time constant with which closures and driven coordinates are pulled back to their commanded
@@ -47,8 +39,6 @@ struct SimulationOptions {
   /// Time constant of the generated file's equality constraints (stock engine), in steps, >= 2:
   /// MuJoCo itself raises smaller ones.
   double stock_time_constant_steps = 2.0;
-  /// Other than kPrescribedMotion: forward mode of the corrected engine, and every DOF commanded.
-  DriveMode drives = DriveMode::kPrescribedMotion;
   DriveForces forces = {};  ///< kForceDriven: the forces; kServo: feed-forward, or empty
   ServoGains servo = {};    ///< kServo only
   /// Free motion only: poses and twists of all bodies at t = 0. They are put onto the loops of the

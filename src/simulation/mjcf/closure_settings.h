@@ -10,7 +10,7 @@ namespace mbv::mjcf {
 [[nodiscard]] std::string WithLines(const std::string& text, const std::string& lines);
 
 /// The text with these attributes on every `connect` and `weld`; an empty one stays as it is. The
-/// text itself where it is no XML.
+/// text itself where it is not XML.
 [[nodiscard]] std::string WithClosureSettings(const std::string& text, const std::string& solref,
                                               const std::string& solimp);
 

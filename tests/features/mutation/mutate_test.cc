@@ -399,7 +399,7 @@ TEST(Mutate, NumbersOfInstancesAndNumbersWrittenInPlaceAreBent) {
     EXPECT_TRUE(m->own.by_force) << name;
   }
   EXPECT_EQ(FindMutation(report, "parts.leg.bodies.rod.inertia[2]")->unit, "kg m^2");
-  // Ranges and pictures are no numbers that could act; zeros are structure.
+  // Ranges and pictures are not numbers that could act; zeros are structure.
   for (const Mutation& m : report.mutations) {
     EXPECT_EQ(m.name.find("range"), std::string::npos) << m.name;
     EXPECT_EQ(m.name.find("shapes"), std::string::npos) << m.name;

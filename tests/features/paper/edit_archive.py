@@ -71,7 +71,7 @@ while words:
     elif word == 'slip':
         more.append((zipfile.ZipInfo(path), b'outside'))
     else:
-        sys.exit(f'{word} is no word of edit_archive.py')
+        sys.exit(f'{word} is not a word of edit_archive.py')
 with zipfile.ZipFile(target, 'w', zipfile.ZIP_DEFLATED) as archive:
     for name, content in files.items():
         archive.writestr(name, content)

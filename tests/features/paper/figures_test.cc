@@ -170,7 +170,7 @@ TEST(OwnFigures, KnowForeignWitnesses) {
   EXPECT_EQ(drawn.size(), 2u);
   options.scenario.set = {{"witnesses", "{other: {command: [x]}}"}};
   EXPECT_THAT(MakeFigures(FigureScenario("four_bar/foreign"), options).diagnostics.Text(),
-              HasSubstr("= 'planar' is no witness"));
+              HasSubstr("= 'planar' is not a witness"));
 }
 
 TEST(OwnFigures, AreDrawnBesideTheUsualOnesAndReplaceThoseOfTheirName) {
@@ -205,7 +205,7 @@ TEST(OwnFigures, MistakesOfFormAreAllToldWithTheirPlaces) {
                        "  - {name: a, panels: [{signals: motor.force, colour: red}], x: q}\n"
                        "  - {name: a, signals: motor.force, width_mm: 2, log: maybe}\n"),
             R"(t.yaml:9:5: error: figures[0]: 'name' is missing
-t.yaml:10:12: error: figures[1].name = '../up' is no name of files
+t.yaml:10:12: error: figures[1].name = '../up' is not a name of files
   hint: write a letter, then letters, digits and '_', at most 64 characters
 t.yaml:10:28: error: figures[1].signals is empty: there is nothing to draw
 t.yaml:11:47: error: figures[2].panels[0]: unknown key 'colour'
@@ -230,15 +230,15 @@ TEST(OwnFigures, NamesAndUnitsThatDoNotFitAreAllToldWithTheirPlaces) {
   hint: did you mean 'motor.force'?
 t.yaml:10:38: error: figures[1].signals[1] = 'motor.position': 'motor.position' is in rad, others of the panel in N m
   hint: a panel has one unit: give it panels
-t.yaml:11:43: error: figures[2].unit = 'kN' is no unit of what is recorded in N m
+t.yaml:11:43: error: figures[2].unit = 'kN' is not a unit of what is recorded in N m
   hint: did you mean 'kN m'?
 t.yaml:12:24: error: figures[3].signals = 'motor.*n': 'motor.acceleration' is in rad/s^2, others of the panel in rad
   hint: a panel has one unit: give it panels
-t.yaml:12:46: error: figures[3].witnesses[0] = 'simulatd' is no witness
+t.yaml:12:46: error: figures[3].witnesses[0] = 'simulatd' is not a witness
   hint: did you mean 'simulated'?
 t.yaml:13:40: error: figures[4].x = 'motor.positon': no witness records such a signal
   hint: did you mean 'motor.position'?
-t.yaml:14:52: error: figures[5].difference_to = 'table' is no witness
+t.yaml:14:52: error: figures[5].difference_to = 'table' is not a witness
   hint: witnesses: analytic, reference, simulated, solver, reached
 )");
 }

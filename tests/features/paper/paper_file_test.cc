@@ -63,7 +63,7 @@ TEST(PaperFile, BadInputIsToldWithItsPlace) {
                         "'difference' needs it"));
   EXPECT_THAT(PaperFindings("[0, 0.5]", "[0.5, 0.5]"), HasSubstr("does not grow"));
   EXPECT_THAT(PaperFindings("[1, 2]", "[1, 2, 3]"), HasSubstr("signals.d.force"));
-  EXPECT_THAT(PaperFindings("fig2:", "\"fig 2\":"), HasSubstr("is no name of files"));
+  EXPECT_THAT(PaperFindings("fig2:", "\"fig 2\":"), HasSubstr("is not a name of files"));
   EXPECT_THAT(PaperFindings("    scenario: run\n", ""), HasSubstr("there is nothing to run"));
   EXPECT_THAT(PaperFindings("    differs: wrong sign", "    section: a.svg"),
               HasSubstr("give one of panels, maps, section and table"));

@@ -232,10 +232,10 @@ TEST_F(HistoryTest, ExportsOneLinePerMetricAndRun) {
 }
 
 TEST_F(HistoryTest, AForeignOrNewerFileIsRefusedAndLeftAlone) {
-  Write(kFile, "this is no database, but long enough to look at");
+  Write(kFile, "this is not a database, but long enough to look at");
   RegressReport report = OneRun({AgreeingCase("model/case", 1e-9)});
   EXPECT_NE(AppendRun(kFile, {}, &report), "");
-  EXPECT_EQ(Read(kFile), "this is no database, but long enough to look at");
+  EXPECT_EQ(Read(kFile), "this is not a database, but long enough to look at");
   std::filesystem::remove(kFile);
   Night(1e-9);
   {
@@ -287,6 +287,7 @@ TEST_F(HistoryTest, FilesOfTheFirstSchemaGoOn) {
 RegressReport NightOf(const std::vector<std::string>& keys,
                       const std::vector<std::string>& covers = {""}) {
   std::vector<CaseResult> cases;
+  cases.reserve(keys.size());
   for (const std::string& key : keys) cases.push_back(AgreeingCase(key, 1e-9));
   RegressReport report = OneRun(cases);
   report.run.covers = covers;

@@ -175,7 +175,7 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     EXPECT_EQ(next.exit_code, 0) << call << next.trouble;
     options_.resume = false;
     check(call);
-    EXPECT_FALSE(fs::exists("out/.mbverify/night")) << call;
+    EXPECT_FALSE(fs::exists("out/.mbverify/regress")) << call;
     EXPECT_FALSE(fs::exists("out/unfinished.txt")) << call;
     EXPECT_EQ(Read("out/index.html").find("has not finished"), std::string::npos) << call;
   }
@@ -196,7 +196,7 @@ TEST_F(PublishingTest, AKeyOfAStrangersShardStaysInItsFolder) {
     options_.out = "joined";
     const RegressOutcome outcome = MergeRuns({"shard"}, options_);
     EXPECT_EQ(outcome.exit_code, 2) << key;
-    EXPECT_NE(outcome.trouble.find("is no name of a scenario"), std::string::npos)
+    EXPECT_NE(outcome.trouble.find("is not a name of a scenario"), std::string::npos)
         << outcome.trouble;
   }
   EXPECT_EQ(Read("victim/summary.json"), "mine");
@@ -223,7 +223,7 @@ TEST_F(PublishingTest, LinksInAStrangersShardAreNotFollowed) {
 TEST_F(PublishingTest, AHistoryThatCannotBeUsedIsExitCode2AndNothingRuns) {
   Scenario("agree");
   Write("foreign.sqlite",
-        "this is no database, but long enough to look at " + std::string(900, 'x'));
+        "this is not a database, but long enough to look at " + std::string(900, 'x'));
   {
     RegressReport report = OneRun({AgreeingCase("m/agree", 1e-9)});
     ASSERT_EQ(AppendRun("damaged.sqlite", {}, &report), "");

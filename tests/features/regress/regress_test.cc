@@ -28,7 +28,7 @@ TEST_F(RegressTest, EverythingAsExpectedIsExitCode0WithAllFiles) {
                            "out/m/agree/summary.json", "out/logs/m/must_fail/bad.txt"}) {
     EXPECT_TRUE(std::filesystem::exists(file)) << file;
   }
-  EXPECT_FALSE(std::filesystem::exists("out/.mbverify/night"));
+  EXPECT_FALSE(std::filesystem::exists("out/.mbverify/regress"));
   EXPECT_GT(CaseOf(outcome, "m/agree").cost.peak_kib, 0);
   EXPECT_EQ(CaseOf(outcome, "m/must_fail/bad").not_compared.size(), 1U);
 }
@@ -145,7 +145,7 @@ TEST_F(RegressTest, ResumeAfterKill9KeepsWhatWasFinished) {
     (void)RunAll();
     _exit(0);
   }
-  for (int i = 0; i < 400 && !std::filesystem::exists("out/.mbverify/night/state/m/agree2.json");
+  for (int i = 0; i < 400 && !std::filesystem::exists("out/.mbverify/regress/state/m/agree2.json");
        ++i) {
     usleep(10000);
   }
@@ -216,7 +216,7 @@ TEST_F(RegressTest, ARunThatIsResumedIsOneRunInTheHistory) {
     if (ended) break;
     // Killed when all was done: what is resumed is a new run.
     const bool done = std::filesystem::exists("out/regress.json") &&
-                      !std::filesystem::exists("out/.mbverify/night/run");
+                      !std::filesystem::exists("out/.mbverify/regress/run");
     options_.resume = true;
     EXPECT_EQ(RunAll().exit_code, 3);
     options_.resume = false;

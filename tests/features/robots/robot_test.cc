@@ -65,7 +65,8 @@ TEST_F(RobotCommands, RunTellsWhatTheFilesOwnSettingsDo) {
   }
   const std::filesystem::path folder = mbverify.folder() / "out/own/setup/first";
   EXPECT_NE(ReadAll(folder / "summary.json").find("\"source_model\""), std::string::npos);
-  EXPECT_NE(ReadAll(folder / "report.html").find("Your own file, run as it is"), std::string::npos);
+  EXPECT_NE(ReadAll(folder / "report.html").find("Your source file, run as it is"),
+            std::string::npos);
 
   const ProgramResult without = mbverify(command + " --no-own-file");
   EXPECT_EQ(without.exit_code, 0) << without.err;

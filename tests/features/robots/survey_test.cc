@@ -1,6 +1,7 @@
 // Robots from files: drives for every DOF, a first motion, and what a survey makes of them.
 #include "features/robots/survey.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -123,7 +124,7 @@ TEST(Survey, ARowGoesThroughBytesUnchanged) {
 
   const std::string csv = SurveyCsv({row});
   EXPECT_EQ(csv.substr(0, csv.find('\n')),
-            "file,status,bodies,loops,freedoms,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
+            "file,status,bodies,loops,dof,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
             "seconds,caveats,message");
   EXPECT_NE(csv.find("a.urdf,ok,3,1,2,,0.33,,,,,not the whole robot; =cmd,\"a, \"\"b\"\" c\"\n"),
             std::string::npos)

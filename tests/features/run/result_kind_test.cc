@@ -123,14 +123,14 @@ TEST(ResultKind, VerboseShowsWhatIsFolded) {
 TEST(ResultKind, OnlyWhatPassesIsFolded) {
   const ColourReport report = Sunset();
   ResultView view = ViewOf(report);
-  const auto shown = [&](bool pass, const std::string& blind, std::optional<double> limit) {
+  const auto shown = [&](bool pass, const std::string& insensitive, std::optional<double> limit) {
     view.checks = {{.name = "eye.steady",
                     .subject = "eye",
                     .title = "steadiness",
                     .limit = limit,
                     .pass = pass,
                     .key = false,
-                    .blind = blind}};
+                    .insensitive = insensitive}};
     TerminalText out({});
     out.Checks(view);
     return out.text().find("steadiness") != std::string::npos;
@@ -189,9 +189,9 @@ TEST(ResultKind, ChecksEndInFiveWays) {
   check.verifies = true;
   EXPECT_EQ(EndOf(check), CheckEnd::kOk);
   check.verifies = false;
-  EXPECT_EQ(EndOf(check), CheckEnd::kHeld);
-  check.blind = "nothing moves";
-  EXPECT_EQ(EndOf(check), CheckEnd::kVoid);
+  EXPECT_EQ(EndOf(check), CheckEnd::kByConstruction);
+  check.insensitive = "nothing moves";
+  EXPECT_EQ(EndOf(check), CheckEnd::kInsensitive);
   check.pass = false;
   EXPECT_EQ(EndOf(check), CheckEnd::kFail);
   check.limit.reset();

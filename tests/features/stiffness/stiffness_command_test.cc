@@ -108,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"closed_form", "scara_robot --closed-form best",
          "analytic.model = 'best' is not one of: corrected"},
         {"map_coordinate", "scara_robot --no-simulation --map z=-0.1 hight=1",
-         "'hight' is no coordinate of the pose"},
+         "'hight' is not a coordinate of the pose"},
         {"map_range", "scara_robot --no-simulation --map x=0.1:-0.1:5", "violates LOW < HIGH"},
         {"map_one_range", "scara_robot --no-simulation --map x=0:0.1:5",
          "1 ranges are given, two are needed"},

@@ -168,10 +168,10 @@ TEST_F(StiffnessScenarioText, NothingToComputeIsNoScenario) {
 
 TEST_F(StiffnessScenarioText, EmptyLoadsAreNoLoads) {
   EXPECT_NE(FindingsOf(std::string(kMinimal) + "loads: [{force: [0, 0, 0]}]\n")
-                .find("loads[0] is no load"),
+                .find("loads[0] is not a load"),
             std::string::npos);
   EXPECT_NE(FindingsOf(std::string(kMinimal) + "loads: {random: {force_max: 0, moment_max: 0}}\n")
-                .find("is no load"),
+                .find("is not a load"),
             std::string::npos);
 }
 

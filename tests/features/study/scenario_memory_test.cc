@@ -115,7 +115,7 @@ TEST_F(ScenarioMemoryTest, AnyNumbersGiveWhatLoadingAnewGives) {
     ScenarioMemory memory;
     std::vector<SetValue> set;
     for (int round = 0; round < 6; ++round) {
-      // New keys, or the same ones with other values; now and then none, or what is no number.
+      // New keys, or the same ones with other values; now and then none, or what is not a number.
       if (round % 3 == 0) {
         set.clear();
         for (size_t k = pick(4); k > 0; --k) set.emplace_back(keys[pick(keys.size())], "");

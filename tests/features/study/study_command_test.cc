@@ -221,7 +221,7 @@ TEST_F(StudyCommand, OtherCountsAndSeedsAreOtherStudiesOfTheSameFile) {
   EXPECT_EQ(Points("d"), Points("c"));
   const ProgramResult odd = Study("e", "--count 10");
   EXPECT_EQ(odd.exit_code, 2);
-  EXPECT_NE(odd.err.find("10 is no power of two"), std::string::npos) << odd.err;
+  EXPECT_NE(odd.err.find("10 is not a power of two"), std::string::npos) << odd.err;
   for (const char* option : {"--seed -3", "--seed 18446744073709551616", "--count -8",
                              "--count 18446744073709551624", "--seed 1.5"}) {
     const ProgramResult refused = Study("f", option);

@@ -87,16 +87,16 @@ TEST_F(StudyFiles, UnknownNamesHaveSuggestions) {
   ExpectIn(text, "'motor.force.maxx' is neither a check nor a statistic of a channel");
   ExpectIn(text, "did you mean 'max'?");
   ExpectIn(text, "did you mean 'reference'?");
-  ExpectIn(text, "limits: 'closure_n' is none of the quantities");
+  ExpectIn(text, "limits: 'closure_n' is not one of the quantities");
 }
 
 TEST_F(StudyFiles, CountsOfSobolArePowersOfTwo) {
   const std::string vary = "{crank: {normal: {sigma_percent: 1}}}";
-  ExpectIn(Refusal(vary, "{sobol: 1000}"), "design.sobol = 1000 is no power of two");
+  ExpectIn(Refusal(vary, "{sobol: 1000}"), "design.sobol = 1000 is not a power of two");
   ExpectIn(Refusal(vary, "{sobol: 1000}"), "512 or 1024");
-  ExpectIn(Refusal(vary, "{saltelli: 3}"), "design.saltelli = 3 is no power of two");
-  ExpectIn(Refusal(vary, "{sobol: 0}"), "design.sobol = 0 is no whole number from 1 on");
-  ExpectIn(Refusal(vary, "{latin_hypercube: 1.5}"), "is no whole number from 1 on");
+  ExpectIn(Refusal(vary, "{saltelli: 3}"), "design.saltelli = 3 is not a power of two");
+  ExpectIn(Refusal(vary, "{sobol: 0}"), "design.sobol = 0 is not a whole number from 1 on");
+  ExpectIn(Refusal(vary, "{latin_hypercube: 1.5}"), "is not a whole number from 1 on");
 }
 
 TEST_F(StudyFiles, MorePointsThanAnyoneMeansNeedAWord) {
@@ -160,7 +160,7 @@ TEST_F(StudyFiles, NeedAScenarioWithAMotion) {
   ExpectIn(named("nowhere.yaml"), "there is no such file");
   ExpectIn(named("../models/four_bar/model.yaml"), "is a model");
   ExpectIn(named("cabin_robot/stiffness.yaml"), "is a stiffness");
-  ExpectIn(LoadStudyText("study: 'a b'\n", "s.yaml").diagnostics.Text(), "'a b' is no name");
+  ExpectIn(LoadStudyText("study: 'a b'\n", "s.yaml").diagnostics.Text(), "'a b' is not a name");
   ExpectIn(LoadStudyText("[1]", "s.yaml").diagnostics.Text(), "error");
 }
 
@@ -310,7 +310,7 @@ TEST_F(StudyFiles, OthersMayAskForOtherPoints) {
   EXPECT_EQ(more.study->design.seed, 5u);
   const StudyResult odd = Load(vary + "design: {sobol: 8}\n", {.drawn = {.count = 60}});
   EXPECT_FALSE(odd.study);
-  ExpectIn(odd.diagnostics.Text(), "60 is no power of two");
+  ExpectIn(odd.diagnostics.Text(), "60 is not a power of two");
   const StudyResult grid =
       Load("vary: {rho: {grid: [1, 2]}}\nquantities: [closure_m]\ndesign: {grid: true}\n",
            {.drawn = {.count = 64}});

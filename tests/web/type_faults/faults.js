@@ -1,6 +1,6 @@
 // Each line marked WRONG has a fault that check_types.cjs must find, and no other line has one.
-import {compare, fits} from '../../../web/src/night/rows.js';
-import {toHash} from '../../../web/src/night/address.js';
+import {compare, fits} from '../../../web/src/regression/rows.js';
+import {toHash} from '../../../web/src/regression/address.js';
 import {indexAt} from '../../../web/src/report/numbers.js';
 import {zoomed} from '../../../web/src/report/scales.js';
 import {element} from '../../../web/src/report/dom.js';

@@ -63,7 +63,7 @@ export function makePanels(data) {
 const indexed = (data) => data.drives.map((drive, index) => ({drive, index}));
 
 /**
- * A force that friction at rest leaves open is no number there: a gap in its line, with a band.
+ * A force that friction at rest leaves open is not a number there: a gap in its line, with a band.
  * @param {Line} line
  * @param {import('./data.js').Signal | undefined} half width of the band
  * @returns {Line}

@@ -61,7 +61,7 @@ function seriesOf(line, log) {
     alpha: style.alpha ?? 1,
     width: style.width,
     dash: line.dash ? [7, 4] : style.dash,
-    spanGaps: !line.band && (style.spans ?? false),  // a band's gap is no missing row
+    spanGaps: !line.band && (style.spans ?? false),  // a band's gap is not a missing row
     paths: style.marks ? () => null : undefined,
     points: {show: Boolean(style.marks), size: 5, width: 1.2, stroke: color,
              fill: isDark() ? '#14191f' : '#fff', filter: style.marks ? visibleMarks : undefined},

@@ -1,5 +1,5 @@
 // Agreements that verify nothing are not told as such, and those that verify less say so.
-#include "comparison/reservations.h"
+#include "comparison/caveats.h"
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ bool Has(const std::vector<Caveat>& caveats, const std::string& part) {
 
 void Widen(Case* c, Metric metric, double limit) { c->limits[metric] = {limit, limit, limit}; }
 
-TEST(Reservations, LimitsWiderThanATenthVerifyNothing) {
+TEST(Caveats, LimitsWiderThanATenthVerifyNothing) {
   Case c;
   for (const Metric metric : {Metric::kForceNrmse, Metric::kForceMax, Metric::kForceOwn}) {
     Widen(&c, metric, 1e9);
@@ -31,10 +31,10 @@ TEST(Reservations, LimitsWiderThanATenthVerifyNothing) {
   EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
   EXPECT_NE(comparison.reason.find("every force limit is so wide"), std::string::npos)
       << comparison.reason;
-  EXPECT_FALSE(comparison.FindCheck("simulated_vs_analytic.force_nrmse")->blind.empty());
+  EXPECT_FALSE(comparison.FindCheck("simulated_vs_analytic.force_nrmse")->insensitive.empty());
 }
 
-TEST(Reservations, OneWideLimitIsNamedAndNotCountedAsVerified) {
+TEST(Caveats, OneWideLimitIsNamedAndNotCountedAsVerified) {
   Case c;
   const size_t all = c.Run().verified();
   Widen(&c, Metric::kReaction, 0.2);
@@ -42,7 +42,7 @@ TEST(Reservations, OneWideLimitIsNamedAndNotCountedAsVerified) {
   const Comparison comparison = c.Run();
   EXPECT_EQ(comparison.verdict, Verdict::kAgree);
   EXPECT_EQ(comparison.verified(), all - 6);
-  EXPECT_EQ(comparison.blind(), 6u);
+  EXPECT_EQ(comparison.insensitive(), 6u);
   EXPECT_NE(comparison.reason.find("6 more verify nothing"), std::string::npos);
   EXPECT_TRUE(Has(comparison.caveats, "simulated_vs_analytic.reaction_nrmse (0.2)"));
   EXPECT_TRUE(Has(comparison.caveats, "simulated_vs_analytic.pose_m (0.2 m)"));
@@ -51,7 +51,7 @@ TEST(Reservations, OneWideLimitIsNamedAndNotCountedAsVerified) {
   EXPECT_TRUE(c.Run().caveats.empty());
 }
 
-TEST(Reservations, AWideLimitThatIsExceededStillDisagrees) {
+TEST(Caveats, AWideLimitThatIsExceededStillDisagrees) {
   Case c;
   for (const Metric metric : {Metric::kForceNrmse, Metric::kForceMax, Metric::kForceOwn}) {
     Widen(&c, metric, 0.5);
@@ -60,7 +60,7 @@ TEST(Reservations, AWideLimitThatIsExceededStillDisagrees) {
   EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
 }
 
-TEST(Reservations, AStartWindowThatLeavesOneSampleVerifiesNothing) {
+TEST(Caveats, AStartWindowThatLeavesOneSampleVerifiesNothing) {
   Case c;
   c.start_window_s = 0.995;
   EXPECT_EQ(c.Run().verdict, Verdict::kNotRun);
@@ -83,7 +83,7 @@ Case Short(Eigen::Index rows) {
   return c;
 }
 
-TEST(Reservations, FewSamplesAndTheDerivativesTheyDoNotAllowAreSaid) {
+TEST(Caveats, FewSamplesAndTheDerivativesTheyDoNotAllowAreSaid) {
   const Comparison seven = Short(7).Run();
   EXPECT_TRUE(seven.caveats.empty()) << seven.caveats.front().text;
   const Comparison six = Short(6).Run();
@@ -108,7 +108,7 @@ Case Weightless() {
   return c;
 }
 
-TEST(Reservations, NothingMovesAndNothingWeighsVerifiesNothing) {
+TEST(Caveats, NothingMovesAndNothingWeighsVerifiesNothing) {
   const Comparison comparison = Weightless().Run();
   EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
   EXPECT_NE(comparison.reason.find("nothing moves, weighs or exerts a force"), std::string::npos)
@@ -121,7 +121,7 @@ TEST(Reservations, NothingMovesAndNothingWeighsVerifiesNothing) {
   EXPECT_EQ(perturbed.Run().verdict, Verdict::kDisagree);
 }
 
-TEST(Reservations, ForcesThatCancelOutAgreeWithAReservation) {
+TEST(Caveats, ForcesThatCancelOutAgreeWithAReservation) {
   Case c;
   for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
     Stretch(trace, "d1.force", 0.0);

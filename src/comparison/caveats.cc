@@ -1,4 +1,4 @@
-#include "comparison/reservations.h"
+#include "comparison/caveats.h"
 
 #include <fmt/format.h>
 
@@ -168,23 +168,23 @@ void MarkBlind(const ComparisonInput& input, Comparison* comparison) {
     const PairComparison* pair = comparison->FindPair(check.subject);
     if (check.metric == Metric::kMotorUse) {
       for (const WitnessMetrics& witness : comparison->witnesses) {
-        if (witness.witness == check.measured) check.blind = witness.unresolved;
+        if (witness.witness == check.measured) check.insensitive = witness.unresolved;
       }
-      if (!check.blind.empty()) continue;
+      if (!check.insensitive.empty()) continue;
     }
     if (IsCoarse(input, check)) {
-      check.blind = "a limit so wide verifies nothing";
+      check.insensitive = "a limit so wide verifies nothing";
     } else if (pair != nullptr && !pair->forces_act && ZeroPasses(*comparison, check)) {
-      check.blind = "nothing asks for drive forces";
+      check.insensitive = "nothing asks for drive forces";
     }
   }
 }
 
 std::string WhyMarginUnknown(const Comparison& comparison) {
   for (const CheckResult& check : comparison.checks) {
-    if (check.metric != Metric::kMotorUse || check.blind.empty() || IsWide(check)) continue;
+    if (check.metric != Metric::kMotorUse || check.insensitive.empty() || IsWide(check)) continue;
     return fmt::format("{}: {}; what motors need between the samples is not known", check.name,
-                       check.blind);
+                       check.insensitive);
   }
   return "";
 }
@@ -193,11 +193,11 @@ std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& c
   bool any = false, coarse = true;
   for (const CheckResult& check : comparison.checks) {
     if (!Judges(input, check)) continue;
-    if (check.blind.empty()) return "";
+    if (check.insensitive.empty()) return "";
     any = true;
     coarse = coarse && IsCoarse(input, check);
   }
-  const bool motion = input.motion->free() || input.drive_by == DriveBy::kForces;
+  const bool motion = input.motion->free() || input.mode == DriveMode::kForceDriven;
   const char* what = input.of_stiffness ? "stiffness and compliance"
                      : motion           ? "position and pose"
                                         : "force";

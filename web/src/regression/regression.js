@@ -1,5 +1,5 @@
-// Brings index.html of a night to life: its table is filtered, sorted, and reached by address.
-import './night.css';
+// Brings index.html of a regression run to life: its table is filtered, sorted, and reached by address.
+import './regression.css';
 
 import {fromHash, kUsual, rowOf, toHash} from './address.js';
 import {compare, fits, sortValue, wordsOf} from './rows.js';

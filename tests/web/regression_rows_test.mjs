@@ -1,8 +1,8 @@
-// Which rows of a night's table are shown and in which order, without a browser.
+// Which rows of a regression run's table are shown and in which order, without a browser.
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {compare, fits, sortValue, wordsOf} from '../../web/src/night/rows.js';
+import {compare, fits, sortValue, wordsOf} from '../../web/src/regression/rows.js';
 
 const row = (text, kind = 'good', mustFail = false) => ({text, kind, mustFail});
 const sorted = (values, up) => [...values].sort((a, b) => compare(a, b, up));

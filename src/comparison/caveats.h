@@ -8,7 +8,7 @@
 
 namespace mbv {
 
-/// Sets `blind` of the checks that verify nothing although they may pass: limits coarser than
+/// Sets `insensitive` of the checks that verify nothing although they may pass: limits coarser than
 /// kCoarsestLimit, drive forces that vanish because nothing moves, weighs or exerts a force, and
 /// motors over samples that do not resolve the motion.
 void MarkBlind(const ComparisonInput& input, Comparison* comparison);

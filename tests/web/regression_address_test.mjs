@@ -1,8 +1,8 @@
-// Filter and order of a night's table in the address, without a browser.
+// Filter and order of a regression run's table in the address, without a browser.
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {fromHash, kUsual, rowOf, toHash} from '../../web/src/night/address.js';
+import {fromHash, kUsual, rowOf, toHash} from '../../web/src/regression/address.js';
 
 const kKinds = ['', 'bad', 'warn', 'good', 'must_fail'], kKeys = ['scenario', 'result', 'error', 'wall'];
 const read = (hash) => fromHash(hash, kKinds, kKeys);
