@@ -15,25 +15,46 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddMutateCommand,
     AddConvergeCommand, AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand,
     AddUpgradeCommand, AddFiguresCommand, AddTablesCommand, AddStudyCommand, AddPackageCommand,
-    AddVerifyCommand, AddRegressCommand, AddMergeCommand, AddHistoryCommand;
+    AddVerifyCommand, AddSensitivityCommand, AddRegressCommand, AddMergeCommand, AddHistoryCommand;
 
 namespace {
 
+// Headings of the help.
+constexpr const char *kStart = "Start", *kVerify = "Verify", *kUnderstand = "Understand",
+                     *kRobots = "Robots and motors", *kEngines = "Engines", *kPublish = "Publish",
+                     *kShell = "Shell";
+
 // In the order of the help.
 constexpr std::array kCommands = {
-    CommandRow{AddInitCommand, true},   CommandRow{AddRunCommand, true},
-    CommandRow{AddRenderCommand, true}, CommandRow{AddModelCommand, true},
-    CommandRow{AddCheckCommand, true},  CommandRow{AddAuditCommand},
-    CommandRow{AddListCommand},         CommandRow{AddWorkspaceCommand},
-    CommandRow{AddStiffnessCommand},    CommandRow{AddMutateCommand},
-    CommandRow{AddConvergeCommand},     CommandRow{AddCrosscheckCommand},
-    CommandRow{AddSurveyCommand, true}, CommandRow{AddInertiaCommand, true},
-    CommandRow{AddSizeCommand},         CommandRow{AddUpgradeCommand},
-    CommandRow{AddFiguresCommand},      CommandRow{AddTablesCommand},
-    CommandRow{AddStudyCommand, true},  CommandRow{AddPackageCommand, true},
-    CommandRow{AddVerifyCommand},       CommandRow{AddTrustCommand},
-    CommandRow{AddRegressCommand},      CommandRow{AddMergeCommand},
-    CommandRow{AddHistoryCommand},      CommandRow{AddCompletionCommand},
+    CommandRow{AddInitCommand, kStart, true},
+    CommandRow{AddListCommand, kStart},
+    CommandRow{AddCheckCommand, kStart, true},
+    CommandRow{AddModelCommand, kStart, true},
+    CommandRow{AddRunCommand, kVerify, true},
+    CommandRow{AddRegressCommand, kVerify},
+    CommandRow{AddMergeCommand, kVerify},
+    CommandRow{AddHistoryCommand, kVerify},
+    CommandRow{AddTrustCommand, kVerify},
+    CommandRow{AddSensitivityCommand, kUnderstand},
+    CommandRow{AddConvergeCommand, kUnderstand},
+    CommandRow{AddStudyCommand, kUnderstand, true},
+    CommandRow{AddAuditCommand, kUnderstand},
+    CommandRow{AddStiffnessCommand, kUnderstand},
+    CommandRow{AddWorkspaceCommand, kUnderstand},
+    CommandRow{AddSurveyCommand, kRobots, true},
+    CommandRow{AddInertiaCommand, kRobots, true},
+    CommandRow{AddSizeCommand, kRobots},
+    CommandRow{AddCrosscheckCommand, kEngines},
+    CommandRow{AddRenderCommand, kPublish, true},
+    CommandRow{AddFiguresCommand, kPublish},
+    CommandRow{AddTablesCommand, kPublish},
+    CommandRow{AddPackageCommand, kPublish, true},
+    CommandRow{AddCompletionCommand, kShell},
+    CommandRow{AddHelpCommand, kShell},
+    // Former names, and what the build asks.
+    CommandRow{AddMutateCommand},
+    CommandRow{AddUpgradeCommand},
+    CommandRow{AddVerifyCommand},
     CommandRow{AddManPageCommand},
 };
 

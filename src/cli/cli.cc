@@ -116,15 +116,38 @@ std::pair<std::string, std::string> AboutUnknownWord(const CLI::App& app) {
           DidYouMean(word, names, "commands: " + Joined(names))};
 }
 
+// "mbverify run [OPTIONS] scenario...".
+std::string UsageOf(const CLI::App& command, const std::string& path) {
+  std::string text = path;
+  if (!command.get_options([](const CLI::Option* o) { return o->nonpositional(); }).empty()) {
+    text += " [OPTIONS]";
+  }
+  for (const CLI::Option* option : command.get_options()) {
+    if (!option->get_positional() || option->get_group().empty()) continue;
+    const std::string word =
+        option->get_name() + (option->get_items_expected_max() > 1 ? "..." : "");
+    text += " " + (option->get_required() ? word : "[" + word + "]");
+  }
+  if (!command.get_subcommands([](const CLI::App*) { return true; }).empty()) text += " COMMAND";
+  return text;
+}
+
 // Help and version, or what is wrong with the command line. Returns the exit code.
 int AnswerParse(const CLI::App& app, const CLI::ParseError& error) {
   const auto [message, hint] = AboutUnknownWord(app);
   if (error.get_exit_code() != 0 && !message.empty()) return Refuse(message, hint);
+  if (error.get_exit_code() != 0) {
+    const CLI::App* command = &app;
+    while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+    const std::string path = CommandPath(*command);
+    const int code = Refuse(error.what(), "");
+    Say(stderr, "usage: {}\n  hint: see {} --help\n", UsageOf(*command, path), path);
+    return code;
+  }
   std::ostringstream out, err;
-  const int code = app.exit(error, out, err);
+  (void)app.exit(error, out, err);
   fmt::print("{}", HelpFor(out.str(), HelpColumns()));
-  SayText(stderr, Shortened(err.str()));
-  return code == 0 ? 0 : 2;
+  return 0;
 }
 
 // --package of commands that read robots.
@@ -196,6 +219,39 @@ CLI::Validator OneOf(const std::vector<std::string>& words) {
       "one of " + list);
 }
 
+void AddHelpCommand(CLI::App* app, int* exit_code) {
+  auto words = std::make_shared<std::vector<std::string>>();
+  CLI::App* help = app->add_subcommand("help", "What a command does, and its options");
+  help->add_option("command", *words, "none: all commands");
+  SetFooter(help, {"help run", "help history compare"}, "0 shown, 2 there is no such command");
+  help->callback([app, words, exit_code] {
+    CLI::App* command = app;
+    std::string path;
+    for (const std::string& word : *words) {
+      path += (path.empty() ? "" : " ") + command->get_name();
+      std::vector<std::string> names;
+      CLI::App* next = nullptr;
+      for (CLI::App* one : command->get_subcommands([](CLI::App*) { return true; })) {
+        if (!one->get_group().empty()) names.push_back(one->get_name());
+        if (one->get_name() == word) next = one;
+      }
+      if (next == nullptr) {
+        *exit_code = Refuse(fmt::format("there is no command '{} {}'", path, Printable(word)),
+                            DidYouMean(word, names, "commands: " + Joined(names)));
+        return;
+      }
+      command = next;
+    }
+    // The help of an app is that of the command it has parsed, which is this one.
+    fmt::print("{}", HelpFor(command->get_formatter()->make_help(
+                                 command,
+                                 path.empty() ? app->get_name() : path + " " + command->get_name(),
+                                 CLI::AppFormatMode::Normal),
+                             HelpColumns()));
+    *exit_code = 0;
+  });
+}
+
 int Refuse(const std::string& message, const std::string& hint) {
   Say(stderr, "error: {}\n", Shortened(message));
   if (!hint.empty()) Say(stderr, "  hint: {}\n", Shortened(hint));
@@ -221,7 +277,7 @@ int RunCli(int argc, char** argv, std::span<const CommandRow> commands) {
       "Verifies the dynamics of closed-loop mechanisms: closed-form equations, a generic "
       "reference solver and MuJoCo against each other.");
   app.name("mbverify");
-  app.set_version_flag("--version", VersionText());
+  app.set_version_flag("-V,--version", VersionText());
   app.require_subcommand(1);
   app.get_formatter()->column_width(std::min<size_t>(30, HelpColumns() / 3));
   SetFooter(&app,
@@ -234,13 +290,21 @@ int RunCli(int argc, char** argv, std::span<const CommandRow> commands) {
     const size_t before = app.get_subcommands([](CLI::App*) { return true; }).size();
     command.add(&app, &exit_code);
     const auto added = app.get_subcommands([](CLI::App*) { return true; });
-    if (command.reads_robots) std::for_each(added.begin() + before, added.end(), AddPackages);
+    for (size_t k = before; k < added.size(); ++k) {
+      added[k]->group(command.heading);
+      if (command.reads_robots) AddPackages(added[k]);
+    }
   }
   RequireFiniteNumbers(&app);
   std::string lost;  // why output was lost
   const ParsedDocuments documents;
   try {
-    app.parse(argc, argv);
+    if (argc <= 1) {  // what there is, but nothing was verified
+      fmt::print("{}", HelpFor(app.help(), HelpColumns()));
+      exit_code = 2;
+    } else {
+      app.parse(argc, argv);
+    }
   } catch (const CLI::ParseError& error) {
     exit_code = AnswerParse(app, error);
   } catch (const std::system_error& error) {

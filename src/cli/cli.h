@@ -33,5 +33,6 @@ void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
 void AddCompletionCommand(CLI::App* app, int* exit_code);
 void AddManPageCommand(CLI::App* app, int* exit_code);
 void AddTrustCommand(CLI::App* app, int* exit_code);
+void AddHelpCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

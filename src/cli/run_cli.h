@@ -14,6 +14,7 @@ namespace mbv {
 /// One command of the program.
 struct CommandRow {
   void (*add)(CLI::App* app, int* exit_code);  ///< adds it; when chosen, it sets *exit_code
+  const char* heading = "";                    ///< that help shows it under; "": not at all
   bool reads_robots = false;                   ///< takes --package for the meshes of robots
 };
 

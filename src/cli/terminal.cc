@@ -48,8 +48,12 @@ bool ObeysEscapes(std::FILE* to) {
 }
 
 bool WantsColor(std::FILE* to) {
-  const char* no_color = std::getenv("NO_COLOR");
-  return ObeysEscapes(to) && (no_color == nullptr || *no_color == '\0');
+  const auto set = [](const char* name) {
+    const char* value = std::getenv(name);
+    return value != nullptr && *value != '\0';
+  };
+  if (set("NO_COLOR")) return false;
+  return set("FORCE_COLOR") || ObeysEscapes(to);
 }
 
 void SayText(std::FILE* to, std::string_view text) {

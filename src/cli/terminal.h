@@ -20,7 +20,7 @@ namespace mbv {
 /// A terminal that obeys cursor movements: TERM is not dumb.
 [[nodiscard]] bool ObeysEscapes(std::FILE* to);
 
-/// Colour: such a terminal, and NO_COLOR is not set.
+/// Colour: such a terminal or FORCE_COLOR, and NO_COLOR is not set.
 [[nodiscard]] bool WantsColor(std::FILE* to = stdout);
 
 /// Prints text to read, broken into lines that fit the terminal. What was printed to stdout

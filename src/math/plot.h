@@ -12,6 +12,13 @@ struct PlotLine {
   std::vector<std::pair<double, double>> points;  ///< NaN breaks the line
   bool markers = false;                           ///< dots at the points
   bool closed = false;
+  bool dashed = false;
+};
+
+/// Filled between two curves, behind all lines.
+struct PlotArea {
+  std::string label;  ///< empty: not in the legend
+  std::vector<double> x, lower, upper;
 };
 
 struct LinePlot {
@@ -19,6 +26,7 @@ struct LinePlot {
   bool log_x = false, log_y = false;    ///< logarithmic axes; points that are not > 0 are left out
   bool equal_scale = false;             ///< one unit is as long on x as on y (sections, paths)
   std::vector<PlotLine> lines;
+  std::vector<PlotArea> areas = {};
 };
 
 /// Values on a regular grid of cells.

@@ -220,6 +220,8 @@ struct Drive {
   double radius = 0.0;  ///< for pictures [m]; 0: chosen by the renderer
   /// Of the servo that holds the drive [N/m or N m/rad]; infinite: locked. Stiffness only.
   double stiffness = std::numeric_limits<double>::infinity();
+  /// What stands behind the letter of a quantity in figures, markup (plot/figure.h): "_{1}".
+  std::string symbol = {};
 };
 
 /// A single-DOF joint whose motion is given (a ship's roll); it is driven, but its force is base

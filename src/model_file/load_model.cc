@@ -168,7 +168,7 @@ const std::vector<std::string> kModelKeys = {
     "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
     "urdf",   "attach",      "up",         "materials", "sections", "parameters_from", "allow",
     "closure_tolerance", "closure_tolerance_mm", "couplings", "motors", "elements",
-    "legs",   "license",     "left_out"};
+    "legs",   "license",     "left_out",   "symbols"};
 // clang-format on
 
 // Reads what needs no parameter.
@@ -661,6 +661,7 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   ReadElastic(each_block, names, &values, &s);
   urdf.WeldRoot(s.urdf.root, s.bodies, &s.joints);
   internal::OrderDrives(root, &yaml, &s.drives);
+  internal::ReadSymbols(root, &yaml, &s.drives);
   ReadMotors(blocks.model(), &yaml, &s);
   internal::ElementReader elements(
       &values, {.names = names, .joints = s.joints, .drives = s.drives}, &s.bushings, &s.elements);

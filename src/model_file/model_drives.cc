@@ -189,6 +189,25 @@ void OrderDrives(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* dri
   *drives = std::move(ordered);
 }
 
+void ReadSymbols(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* drives) {
+  const YamlNode* symbols = root.is_map() ? root.Find("symbols") : nullptr;
+  if (symbols == nullptr || symbols->is_null()) return;
+  std::vector<std::string> names;
+  names.reserve(drives->size());
+  for (const Drive& drive : *drives) names.push_back(drive.name);
+  for (const YamlEntry& entry : yaml->Entries(*symbols, "symbols")) {
+    const int d = IndexOf(*drives, entry.key);
+    if (d < 0) {
+      yaml->Error(entry, fmt::format("symbols: there is no drive '{}'", entry.key),
+                  DidYouMean(entry.key, names));
+      continue;
+    }
+    if (const auto text = yaml->Text(*entry.value, JoinPath("symbols", entry.key))) {
+      (*drives)[static_cast<size_t>(d)].symbol = *text;
+    }
+  }
+}
+
 void ReadPrescribed(const Block& block, const ModelJoints& joints, YamlReader* yaml,
                     SignalPlaces* places, std::vector<Prescribed>* prescribed) {
   const std::string section = block.PathOf("prescribed");

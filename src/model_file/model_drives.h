@@ -59,6 +59,8 @@ std::optional<double> ReadInCoordinateUnit(ModelValues* values, const Block& blo
 
 /// Puts the drives into the order of `drive_order`, which lists every one once.
 void OrderDrives(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* drives);
+/// `symbols:` of the model: what figures call drives.
+void ReadSymbols(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* drives);
 
 /// Reads prescribed joints.
 void ReadPrescribed(const Block& block, const ModelJoints& joints, YamlReader* yaml,

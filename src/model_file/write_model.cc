@@ -227,6 +227,12 @@ class ModelWriter {
       if (std::isfinite(drive.stiffness)) text += fmt::format(", stiffness: {}", drive.stiffness);
       text += "}\n";
     }
+    std::string symbols;
+    for (size_t d = 0; d < m_.drives.size(); ++d) {
+      if (m_.drives[d].symbol.empty()) continue;
+      symbols += fmt::format("  {}: {}\n", names_.drives[d], QuotedYaml(m_.drives[d].symbol));
+    }
+    if (!symbols.empty()) text += "symbols:\n" + symbols;
     return m_.drives.empty() ? "" : text;
   }
 

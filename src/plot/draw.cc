@@ -197,7 +197,6 @@ void Canvas::Clipped(double x, double y, double width, double height,
 
 namespace {
 
-constexpr double kTextGap = 3.0;  // between axes and texts [pt]
 constexpr const char* kBlack = "#000000";
 
 class FigurePainter {

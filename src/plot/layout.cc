@@ -89,7 +89,6 @@ namespace {
 constexpr double kUsualHeight = 0.46;  // of a panel's axes, against the figure's width
 constexpr double kLeastHeight = 0.25, kMostHeight = 1.3;
 constexpr double kEdge = 1.0;      // around the figure [pt]
-constexpr double kGap = 3.0;       // between axes and texts [pt]
 constexpr double kBarWidth = 8.0;  // of a map's colours [pt]
 constexpr double kBarGap = 6.0;    // between it and the axes [pt]
 
@@ -241,9 +240,9 @@ class LayoutMaker {
       bar_texts = std::max(bar_texts, WidestOf(canvas_, panel.value_ticks));
     }
     layout_.bar_text_room = bar_texts;
-    const double left = kEdge + layout_.row + kGap + layout_.tick_room + kGap;
-    const double bar =
-        map ? kBarGap + kBarWidth + kGap + bar_texts + kGap + layout_.row : 0.5 * style_.font_pt;
+    const double left = kEdge + layout_.row + kTextGap + layout_.tick_room + kTextGap;
+    const double bar = map ? kBarGap + kBarWidth + kTextGap + bar_texts + kTextGap + layout_.row
+                           : 0.5 * style_.font_pt;
     const double width = layout_.width - left - bar - kEdge;
     layout_.bar_left = left + width + kBarGap;
     layout_.bar_width = kBarWidth;
@@ -280,7 +279,7 @@ class LayoutMaker {
     const auto most = static_cast<size_t>(std::max(1.0, std::floor(room / column)));
     const size_t lines = (rows.size() + most - 1) / most;
     layout_.panels[k].legend_columns = (rows.size() + lines - 1) / lines;
-    return static_cast<double>(lines) * layout_.row + kGap;
+    return static_cast<double>(lines) * layout_.row + kTextGap;
   }
 
   [[nodiscard]] double EqualHeight(const PanelPlace& panel) const {
@@ -309,7 +308,7 @@ class LayoutMaker {
   }
 
   void PlaceDown() {
-    const double x_texts = kGap + layout_.row + kGap + layout_.row;
+    const double x_texts = kTextGap + layout_.row + kTextGap + layout_.row;
     std::vector<double> legends(size()), below(size());
     // Without a legend, half of the uppermost tick's text stands above the axes.
     const double above = LegendOf(figure_.panels.front()).empty() ? 0.5 * layout_.row : 0;
@@ -318,7 +317,7 @@ class LayoutMaker {
       PanelPlace& panel = layout_.panels[k];
       panel.names_x = !figure_.common_x || k + 1 == size();
       legends[k] = LegendHeight(k);
-      below[k] = panel.names_x ? x_texts + (k + 1 == size() ? 0 : 2 * kGap) : layout_.row;
+      below[k] = panel.names_x ? x_texts + (k + 1 == size() ? 0 : 2 * kTextGap) : layout_.row;
       fixed += legends[k] + below[k];
     }
     FitHeights(fixed);

@@ -58,6 +58,7 @@ struct FigureLayout {
 /// What a legend's sample of a line takes [pt], and the gap behind it.
 inline constexpr double kSampleWidth = 17.0, kSampleGap = 3.0;
 inline constexpr double kTickLength = 2.5;  ///< [pt], inwards
+inline constexpr double kTextGap = 3.0;     ///< between axes and texts [pt]
 /// The rows of a panel's legend.
 [[nodiscard]] std::vector<const FigureCurve*> LegendOf(const FigurePanel& panel);
 

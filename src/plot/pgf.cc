@@ -1,6 +1,7 @@
 #include "plot/pgf.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -36,7 +37,7 @@ class PgfWriter {
   std::vector<std::pair<std::string, std::string>> Write() {
     Head();
     for (size_t k = 0; k < figure_.panels.size(); ++k) Panel(figure_.panels[k], layout_.panels[k]);
-    tex_ += "\\end{groupplot}\n\\end{tikzpicture}\n";
+    tex_ += "\\end{tikzpicture}\n";
     std::vector<std::pair<std::string, std::string>> files = {{figure_.name + ".tex", tex_}};
     if (!curves_.empty()) files.emplace_back(figure_.name + ".dat", CurveTable());
     for (size_t k = 0; k < maps_.size(); ++k) files.emplace_back(MapFile(k), maps_[k]);
@@ -49,50 +50,120 @@ class PgfWriter {
     fmt::format_to(std::back_inserter(tex_), format, std::forward<T>(values)...);
   }
 
+  // Everything stands where the other formats have it: pgfplots' own places depend on what it has
+  // measured, so that figures would be wider than their column, and names of an axis meet legends.
   void Head() {
-    Add("% {}: needs \\usepackage{{pgfplots}}, \\usepgfplotslibrary{{groupplots}} and\n"
-        "% \\pgfplotsset{{compat=1.16}}; Chinese texts need ctex with XeLaTeX or LuaLaTeX.\n",
-        figure_.name);
+    Add("% {}: needs \\usepackage{{pgfplots}} and \\pgfplotsset{{compat=1.16}}; Chinese texts "
+        "need\n"
+        "% ctex with XeLaTeX or LuaLaTeX. {:.4g} mm wide and {:.4g} mm high.\n",
+        figure_.name, layout_.width / PointsOf(1.0), layout_.height / PointsOf(1.0));
     for (size_t k = 0; k < style_.colors.size(); ++k) {
-      Add("\\definecolor{{mbv{}}}{{HTML}}{{{}}}\n", k, HexOf(style_.colors[k]));
+      Add("\\definecolor{{mbv{}}}{{HTML}}{{{}}}%\n", k, HexOf(style_.colors[k]));
     }
-    const std::string font =
+    font_ =
         fmt::format("\\fontsize{{{:g}}}{{{:g}}}\\selectfont", style_.font_pt, 1.2 * style_.font_pt);
-    Add("\\begin{{tikzpicture}}\n\\begin{{groupplot}}[\n"
-        "  group style={{group size=1 by {}, vertical sep={}{}}},\n"
-        "  scale only axis, width={}, unbounded coords=jump, tick align=inside,\n"
+    Add("\\begin{{tikzpicture}}\n\\useasboundingbox (0,0) rectangle ({},{});\n"
+        "\\pgfplotsset{{every axis/.append style={{\n"
+        "  anchor=north west, scale only axis, width={}, unbounded coords=jump,\n"
+        "  tick align=inside, scaled ticks=false, minor tick num=0,\n"
         "  axis line style={{line width={:g}pt}}, tick style={{black, line width={:g}pt}},\n"
-        "  label style={{font={}}}, tick label style={{font={}}},\n"
-        "  legend style={{font={}, draw=none, fill=none, at={{(0,1.02)}}, anchor=south west,\n"
-        "    cells={{anchor=west}}, /tikz/every even column/.append style={{column sep=6pt}}}}]\n",
-        figure_.panels.size(), Bp(Separation()),
-        figure_.common_x ? ", xlabels at=edge bottom, xticklabels at=edge bottom" : "",
-        Bp(layout_.panels[0].width), style_.axis_pt, style_.axis_pt, font, font, font);
-  }
-
-  // From the axes of one panel to those of the next; with one panel of no use.
-  [[nodiscard]] double Separation() const {
-    if (layout_.panels.size() < 2) return layout_.row;
-    const PanelPlace &a = layout_.panels[0], &b = layout_.panels[1];
-    return b.top - a.top - a.height;
+        "  major tick length={}, tick label style={{font={}}},\n"
+        "  xticklabel style={{anchor=north, inner sep=0pt, yshift=-{}}},\n"
+        "  yticklabel style={{anchor=east, inner sep=0pt, xshift=-{}}},\n"
+        "  xlabel style={{font={}, at={{(axis description cs:0.5,0)}}, anchor=north,\n"
+        "    inner sep=0pt, yshift=-{}}},\n"
+        "  ylabel style={{font={}, at={{(axis description cs:0,0.5)}}, anchor=south,\n"
+        "    inner sep=0pt, yshift={}}}}}}}\n",
+        Bp(layout_.width), Bp(-layout_.height), Bp(layout_.panels[0].width), style_.axis_pt,
+        style_.axis_pt, Bp(kTickLength), font_, Bp(kTextGap), Bp(kTextGap), font_,
+        Bp(2 * kTextGap + layout_.row), font_, Bp(2 * kTextGap + layout_.tick_room));
   }
 
   static double End(const PlotAxis& axis, double inner) {
     return axis.log ? std::pow(10.0, inner) : inner;
   }
 
-  void Panel(const FigurePanel& panel, const PanelPlace& place) {
-    Add("\\nextgroupplot[height={}, xmin={:.8g}, xmax={:.8g}, ymin={:.8g}, ymax={:.8g}{}{},\n"
-        "  xlabel={{{}}}, ylabel={{{}}}, legend columns={}{}]\n",
-        Bp(place.height), End(place.x, place.x.low), End(place.x, place.x.high),
-        End(place.y, place.y.low), End(place.y, place.y.high), place.x.log ? ", xmode=log" : "",
-        place.y.log ? ", ymode=log" : "", ToTex(panel.x.label), ToTex(panel.y.label),
-        place.legend_columns, panel.map ? MapOptions(*panel.map, place.value) : "");
-    if (panel.map) Map(*panel.map, place.value);
-    for (const FigureCurve& curve : panel.curves) Curve(curve);
+  // ", xtick={0,0.5}, xticklabels={{0.0},{0.5}}"; without texts where another panel names the axis.
+  static std::string Ticks(char axis, const std::vector<FigureTick>& ticks, bool texts) {
+    std::vector<std::string> values, labels;
+    for (const FigureTick& tick : ticks) {
+      values.push_back(fmt::format("{:.8g}", tick.value));
+      if (texts) labels.push_back("{" + ToTex(tick.text) + "}");
+    }
+    return fmt::format(", {}tick={{{}}}, {}ticklabels={{{}}}", axis, fmt::join(values, ","), axis,
+                       fmt::join(labels, ","));
   }
 
-  [[nodiscard]] std::string LookOf(const FigureCurve& curve) const {
+  void Panel(const FigurePanel& panel, const PanelPlace& place) {
+    Add("\\begin{{axis}}[at={{({},{})}}, height={},\n"
+        "  xmin={:.8g}, xmax={:.8g}, ymin={:.8g}, ymax={:.8g}{}{},\n  {},\n  {},\n"
+        "  xlabel={{{}}}, ylabel={{{}}}{}]\n",
+        Bp(place.left), Bp(-place.top), Bp(place.height), End(place.x, place.x.low),
+        End(place.x, place.x.high), End(place.y, place.y.low), End(place.y, place.y.high),
+        place.x.log ? ", xmode=log" : "", place.y.log ? ", ymode=log" : "",
+        Ticks('x', place.x_ticks, place.names_x).substr(2),
+        Ticks('y', place.y_ticks, true).substr(2), place.names_x ? ToTex(panel.x.label) : "",
+        ToTex(panel.y.label), panel.map ? ", axis on top" : "");
+    if (panel.map) Map(*panel.map, place.value);
+    for (const FigureCurve& curve : panel.curves) Curve(curve);
+    tex_ += "\\end{axis}\n";
+    if (panel.map) ColorBar(*panel.map, place);
+    Legend(panel, place);
+  }
+
+  // "(32.4bp,-5.2bp)" of a place from the upper left corner.
+  static std::string At(double x, double y) { return fmt::format("({},{})", Bp(x), Bp(-y)); }
+
+  // A text beside a point, as high as small letters are.
+  void Label(double x, double y, const std::string& markup) {
+    Add("\\node[anchor=base west, inner sep=0pt, font={}] at {} {{{}}};\n", font_,
+        At(x, y + 0.35 * style_.font_pt), ToTex(markup));
+  }
+
+  void Legend(const FigurePanel& panel, const PanelPlace& place) {
+    const std::vector<const FigureCurve*> rows = LegendOf(panel);
+    if (rows.empty()) return;
+    const double column = (layout_.width - place.left) / static_cast<double>(place.legend_columns);
+    for (size_t k = 0; k < rows.size(); ++k) {
+      const double x = place.left + column * static_cast<double>(k % place.legend_columns);
+      const size_t line = k / place.legend_columns;
+      const double y = place.legend_top + layout_.row * (0.5 + static_cast<double>(line));
+      if (rows[k]->line) {
+        Add("\\draw[{}] {} -- {};\n", LineLook(*rows[k]), At(x, y), At(x + kSampleWidth, y));
+      }
+      if (rows[k]->marker >= 0) {
+        Add("\\draw[{}{}] plot coordinates {{{}}};\n", LineLook(*rows[k]), MarkLook(*rows[k]),
+            At(x + 0.5 * kSampleWidth, y));
+      }
+      Label(x + kSampleWidth + kSampleGap, y, rows[k]->label);
+    }
+  }
+
+  void ColorBar(const MapPlot& map, const PanelPlace& place) {
+    constexpr int kSteps = 64;
+    const double left = layout_.bar_left, right = left + layout_.bar_width;
+    const double step = place.height / kSteps;
+    for (int i = 0; i < kSteps; ++i) {
+      const Rgb rgb = MapColor((i + 0.5) / kSteps);
+      // Down to the box's lower edge: readers show the ground between neighbours.
+      Add("\\fill[color={{rgb,255:red,{};green,{};blue,{}}}] {} rectangle {};\n", rgb[0], rgb[1],
+          rgb[2], At(left, place.top + place.height - i * step), At(right, place.top));
+    }
+    Add("\\draw[line width={:g}pt] {} rectangle {};\n", style_.axis_pt, At(left, place.top),
+        At(right, place.top + place.height));
+    for (const FigureTick& tick : place.value_ticks) {
+      const double y = place.value.Px(tick.value);
+      Add("\\draw[line width={:g}pt] {} -- {};\n", style_.axis_pt, At(right, y),
+          At(right - kTickLength, y));
+      Label(right + kTextGap, y, tick.text);
+    }
+    Add("\\node[rotate=90, anchor=north, inner sep=0pt, font={}] at {} {{{}}};\n", font_,
+        At(right + 2 * kTextGap + layout_.bar_text_room, place.top + 0.5 * place.height),
+        ToTex(map.value_label));
+  }
+
+  // Colour, width and dashes.
+  [[nodiscard]] std::string LineLook(const FigureCurve& curve) const {
     const auto index = static_cast<size_t>(std::max(0, curve.look)) % style_.colors.size();
     std::string look = curve.look < 0 ? "black" : fmt::format("mbv{}", index);
     look += fmt::format(", line width={:g}pt", curve.extent ? style_.axis_pt : style_.line_pt);
@@ -103,37 +174,21 @@ class PgfWriter {
                              dashes[k] * style_.line_pt);
     }
     if (curve.line && !curve.extent && !pattern.empty()) look += ", dash pattern=" + pattern;
-    if (curve.marker < 0) return look + ", no markers";
-    return look + fmt::format("{}, mark={}, mark size={:g}pt, mark options={{solid, fill=white}}",
-                              curve.line ? "" : ", only marks",
-                              kMarks.at(static_cast<size_t>(curve.marker % kMarkerShapes)),
-                              0.5 * style_.marker_pt);
+    return look;
+  }
+
+  [[nodiscard]] std::string MarkLook(const FigureCurve& curve) const {
+    return fmt::format(", mark={}, mark size={:g}pt, mark options={{solid, fill=white}}",
+                       kMarks.at(static_cast<size_t>(curve.marker % kMarkerShapes)),
+                       0.5 * style_.marker_pt);
   }
 
   void Curve(const FigureCurve& curve) {
-    const std::string look = LookOf(curve);
-    if (curve.points.empty()) {
-      Add("\\addlegendimage{{{}}}\n", look);
-    } else {
-      Add("\\addplot[{}{}] table[x=x{}, y=y{}] {{{}.dat}};\n", look,
-          curve.label.empty() ? ", forget plot" : "", curves_.size(), curves_.size(), figure_.name);
-      curves_.push_back(&curve);
-    }
-    if (!curve.label.empty()) Add("\\addlegendentry{{{}}}\n", ToTex(curve.label));
-  }
-
-  static std::string MapOptions(const MapPlot& map, const PlotAxis& value) {
-    std::string colors;
-    for (int k = 0; k <= 4; ++k) {
-      const Rgb rgb = MapColor(0.25 * k);
-      colors += fmt::format(" rgb255=({},{},{})", rgb[0], rgb[1], rgb[2]);
-    }
-    return fmt::format(
-        ",\n  axis on top, colormap={{mbv}}{{{}}}, colorbar, point meta min={:.8g}, point meta "
-        "max={:.8g},\n"
-        "  colorbar style={{ylabel={{{}}}{}}}",
-        colors.substr(1), value.low, value.high, ToTex(map.value_label),
-        value.log ? ", yticklabel={$10^{\\pgfmathprintnumber{\\tick}}$}" : "");
+    if (curve.points.empty()) return;  // of the legend alone
+    Add("\\addplot[{}{}{}] table[x=x{}, y=y{}] {{{}.dat}};\n", LineLook(curve),
+        curve.line ? "" : ", only marks", curve.marker < 0 ? ", no markers" : MarkLook(curve),
+        curves_.size(), curves_.size(), figure_.name);
+    curves_.push_back(&curve);
   }
 
   // A picture: as cells a map of usual size exceeds TeX's memory.
@@ -187,7 +242,7 @@ class PgfWriter {
   const Figure& figure_;
   const FigureStyle& style_;
   const FigureLayout layout_;
-  std::string tex_;
+  std::string tex_, font_;
   std::vector<std::string> maps_;
   std::vector<const FigureCurve*> curves_;
 };

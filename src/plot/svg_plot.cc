@@ -109,23 +109,28 @@ constexpr double kWidth = 720, kHeight = 520;
 constexpr double kLeft = 84, kRight = 24, kTop = 44, kBottom = 60;
 constexpr double kOverlap = 0.3;  // of neighbouring cells, or the ground would shine through
 constexpr const char* kGridColor = "#dddddd";
+constexpr const char* kAreaColor = "#56b4e9";
 
-// The whole picture: on white, with a title.
+// The whole picture: on white, with a title. Pages give what has a class their own colours
+// (web/src/report/report.css).
 std::string SvgPicture(const std::string& title, const std::string& content,
                        double height = kHeight) {
-  return SvgElement(
-             "svg",
-             {{"xmlns", kSvgNamespace},
-              {"viewBox", fmt::format("0 0 {:g} {:g}", kWidth, height)},
-              {"width", kWidth},
-              {"height", height},
-              {"font-family", "sans-serif"},
-              {"font-size", "13"},
-              {"role", "img"}},
-             "\n" + SvgElement("title", {}, EscapeMarkup(title)) + "\n" +
-                 SvgShape("rect", {{"width", "100%"}, {"height", "100%"}, {"fill", "#ffffff"}}) +
-                 "\n" + SvgText({{"x", kLeft}, {"y", "26"}, {"font-size", "16"}}, title) + "\n" +
-                 content) +
+  return SvgElement("svg",
+                    {{"xmlns", kSvgNamespace},
+                     {"viewBox", fmt::format("0 0 {:g} {:g}", kWidth, height)},
+                     {"width", kWidth},
+                     {"height", height},
+                     {"class", "chart"},
+                     {"font-family", "sans-serif"},
+                     {"font-size", "13"},
+                     {"role", "img"}},
+                    "\n" + SvgElement("title", {}, EscapeMarkup(title)) + "\n" +
+                        SvgShape("rect", {{"class", "ground"},
+                                          {"width", "100%"},
+                                          {"height", "100%"},
+                                          {"fill", "#ffffff"}}) +
+                        "\n" + SvgText({{"x", kLeft}, {"y", "26"}, {"font-size", "16"}}, title) +
+                        "\n" + content) +
          "\n";
 }
 
@@ -135,7 +140,8 @@ std::string Frame(const PlotAxis& x, const PlotAxis& y, const std::string& x_lab
   std::string svg;
   for (double v : x.Ticks()) {
     const double px = x.Px(v);
-    svg += SvgShape("line", {{"x1", px, 1},
+    svg += SvgShape("line", {{"class", "grid"},
+                             {"x1", px, 1},
                              {"x2", px, 1},
                              {"y1", top, 1},
                              {"y2", bottom, 1},
@@ -146,7 +152,8 @@ std::string Frame(const PlotAxis& x, const PlotAxis& y, const std::string& x_lab
   }
   for (double v : y.Ticks()) {
     const double px = y.Px(v);
-    svg += SvgShape("line", {{"x1", left, 1},
+    svg += SvgShape("line", {{"class", "grid"},
+                             {"x1", left, 1},
                              {"x2", right, 1},
                              {"y1", px, 1},
                              {"y2", px, 1},
@@ -157,7 +164,8 @@ std::string Frame(const PlotAxis& x, const PlotAxis& y, const std::string& x_lab
   }
   const std::string turned = fmt::format("translate(18 {:.1f}) rotate(-90)", 0.5 * (top + bottom));
   return svg +
-         SvgShape("rect", {{"x", left, 1},
+         SvgShape("rect", {{"class", "frame"},
+                           {"x", left, 1},
                            {"y", top, 1},
                            {"width", right - left, 1},
                            {"height", bottom - top, 1},
@@ -186,14 +194,31 @@ std::string Curve(const PlotLine& line, const char* color, const PlotAxis& x, co
     pen_down = true;
   }
   if (line.closed && !path.empty()) path += " Z";
-  return SvgShape("path",
-                  {{"d", path}, {"fill", "none"}, {"stroke", color}, {"stroke-width", "1.8"}}) +
+  const SvgAttribute d("d", path), fill("fill", "none"), stroke("stroke", color),
+      width("stroke-width", "1.8"), dashes("stroke-dasharray", "6 4");
+  return (line.dashed ? SvgShape("path", {d, fill, stroke, width, dashes})
+                      : SvgShape("path", {d, fill, stroke, width})) +
          "\n" + dots;
+}
+
+// There along the upper curve, back along the lower one.
+std::string Area(const PlotArea& area, const PlotAxis& x, const PlotAxis& y) {
+  std::string path;
+  const size_t n = area.x.size();
+  for (size_t i = 0; i < 2 * n; ++i) {
+    const bool up = i < n;
+    const size_t k = up ? i : 2 * n - 1 - i;
+    path += fmt::format("{}{:.2f} {:.2f}", i == 0 ? "M" : " L", x.Px(area.x[k]),
+                        y.Px(up ? area.upper[k] : area.lower[k]));
+  }
+  return SvgShape("path", {{"d", path + " Z"}, {"fill", kAreaColor}, {"fill-opacity", "0.35"}}) +
+         "\n";
 }
 
 struct LegendEntry {
   std::string label;
   const char* color = nullptr;
+  bool dashed = false, area = false;
 };
 
 // Below the axes, in two columns if the labels are short; makes the figure higher.
@@ -209,12 +234,12 @@ std::string Legend(const std::vector<LegendEntry>& entries, double* height) {
     const size_t row = i / columns;
     const double left = kLeft + kColumn * static_cast<double>(i % columns);
     const double y = kHeight + 4 + kRow * static_cast<double>(row);
-    svg += SvgShape("line", {{"x1", left},
-                             {"x2", left + 22},
-                             {"y1", y - 4},
-                             {"y2", y - 4},
-                             {"stroke", entries[i].color},
-                             {"stroke-width", "2.5"}}) +
+    const SvgAttribute x1("x1", left), x2("x2", left + 22), y1("y1", y - 4), y2("y2", y - 4),
+        stroke("stroke", entries[i].color), width("stroke-width", entries[i].area ? "9" : "2.5"),
+        pale("stroke-opacity", "0.35"), dashes("stroke-dasharray", "6 4");
+    svg += (entries[i].area     ? SvgShape("line", {x1, x2, y1, y2, stroke, width, pale})
+            : entries[i].dashed ? SvgShape("line", {x1, x2, y1, y2, stroke, width, dashes})
+                                : SvgShape("line", {x1, x2, y1, y2, stroke, width})) +
            SvgText({{"x", left + 28}, {"y", y}}, entries[i].label) + "\n";
   }
   const size_t rows = (entries.size() + columns - 1) / columns;
@@ -296,15 +321,26 @@ std::string ToSvg(const LinePlot& plot) {
       y.Add(v);
     }
   }
+  for (const PlotArea& area : plot.areas) {
+    for (const double u : area.x) x.Add(u);
+    for (const double v : area.lower) y.Add(v);
+    for (const double v : area.upper) y.Add(v);
+  }
   x.Pad();
   y.Pad();
   if (plot.equal_scale) EqualScale(&x, &y);
   std::string curves;
   std::vector<LegendEntry> legend;
+  for (const PlotArea& area : plot.areas) {
+    curves += Area(area, x, y);
+    if (!area.label.empty()) legend.push_back({area.label, kAreaColor, false, true});
+  }
   for (size_t i = 0; i < plot.lines.size(); ++i) {
     const char* color = kLineColors[i % kLineColors.size()];
     curves += Curve(plot.lines[i], color, x, y);
-    if (!plot.lines[i].label.empty()) legend.push_back({plot.lines[i].label, color});
+    if (!plot.lines[i].label.empty()) {
+      legend.push_back({plot.lines[i].label, color, plot.lines[i].dashed});
+    }
   }
   double height = kHeight;
   const std::string below = Legend(legend, &height);
@@ -406,8 +442,19 @@ std::string BarLine(const BarRow& row, double top, double scale) {
                              {"y", top + 2},
                              {"width", width, 1},
                              {"height", "14"},
-                             {"fill", kBarColors[c % kBarColors.size()]}}) +
-           SvgText({{"x", left + width + 5, 1}, {"y", top + 13}},
+                             {"fill", kBarColors[c % kBarColors.size()]}});
+    double end = width;
+    if (!row.intervals.empty() && std::isfinite(row.intervals[c][1])) {
+      const auto [low, high] = row.intervals[c];
+      const double from = left + scale * std::max(0.0, low), to = left + scale * high;
+      svg += SvgShape("path", {{"d", fmt::format("M{0:.1f} {2:g}v8M{0:.1f} {3:g}H{1:.1f}M{1:.1f} "
+                                                 "{2:g}v8",
+                                                 from, to, top + 5, top + 9)},
+                               {"fill", "none"},
+                               {"stroke", "currentColor"}});
+      end = std::max(end, to - left);
+    }
+    svg += SvgText({{"x", left + end + 5, 1}, {"y", top + 13}},
                    fmt::format("{:.2f} %", 100 * row.shares[c])) +
            "\n";
   }
@@ -420,6 +467,9 @@ std::string ToSvg(const BarPlot& plot) {
   double most = 1e-12;
   for (const BarRow& row : plot.rows) {
     for (const double share : row.shares) most = std::max(most, std::abs(share));
+    for (const auto& [low, high] : row.intervals) {
+      if (std::isfinite(high)) most = std::max(most, high);
+    }
   }
   std::string svg = "\n";
   for (size_t c = 0; c < plot.columns.size(); ++c) {

@@ -57,6 +57,8 @@ void EqualScale(PlotAxis* x, PlotAxis* y);
 struct BarRow {
   std::string name;
   std::vector<double> shares;  ///< in parts of one; shown in percent
+  /// Per share: the interval that it lies in, drawn as a line with ends; empty: none is known.
+  std::vector<std::array<double, 2>> intervals = {};
 };
 struct BarPlot {
   std::string title;                 ///< for readers who do not see the bars

@@ -283,8 +283,16 @@ struct HtmlWriter {
 
 std::string BlocksHtml(const std::vector<Block>& blocks) {
   std::string html;
-  for (const Block& block : blocks) {
-    if (block.on != On::kTerminal) html += std::visit(HtmlWriter{}, block.what);
+  const auto drawn = [&](size_t k) {
+    return k < blocks.size() && std::holds_alternative<Drawing>(blocks[k].what);
+  };
+  for (size_t k = 0; k < blocks.size(); ++k) {
+    if (blocks[k].on == On::kTerminal) continue;
+    // Several drawings stand side by side where there is room.
+    const bool opens = drawn(k) && !(k > 0 && drawn(k - 1)) && drawn(k + 1);
+    const bool closes = drawn(k) && !drawn(k + 1) && k > 0 && drawn(k - 1);
+    html += (opens ? "<div class=\"static-plots\">\n" : "") +
+            std::visit(HtmlWriter{}, blocks[k].what) + (closes ? "</div>\n" : "");
   }
   return html;
 }

@@ -73,6 +73,7 @@ struct SmoothedForce {
 /// Of a motion.
 struct Report : ResultFrame {
   std::vector<std::string> drives;   ///< model order
+  std::vector<std::string> symbols;  ///< of the drives; "": they have none (Drive::symbol)
   std::string simulation;            ///< one line: mode, step, engine
   std::string mode;                  ///< "forward", "inverse", "force_driven", "servo", "off"
   std::string engine = "corrected";  ///< or "stock"

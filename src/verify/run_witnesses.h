@@ -2,7 +2,8 @@
 //
 // Who takes part, in which order and by which computation stands in one table (kComputations in
 // run_witnesses.cc), one row for each role (base/roles.h). All commands run witnesses here: `run`
-// all of them, `mutate` the simulated side many times, `converge` the engine with its own options.
+// all of them, `sensitivity` the simulated side many times, `converge` the engine with its own
+// options.
 #pragma once
 
 #include <functional>

@@ -94,7 +94,7 @@ TEST_F(CliTest, UrdfLeavesBeamsOutWithAWarning) {
 TEST_F(CliTest, MutateTakesPercentAndWritesJson) {
   const std::string json = (mbverify.folder() / "m.json").string();
   const ProgramResult result = mbverify(
-      "mutate scenarios/four_bar/turn_inverse.yaml --parameter rho --size 1% --json " + json);
+      "sensitivity scenarios/four_bar/turn_inverse.yaml --parameter rho --size 1% --json " + json);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("1 of 1 numbers (1 parameters), each 1 % too large and too small"),
             std::string::npos)
@@ -104,15 +104,16 @@ TEST_F(CliTest, MutateTakesPercentAndWritesJson) {
   EXPECT_EQ(parsed["size"], 0.01);
   EXPECT_EQ(parsed["numbers"][0]["name"], "rho");
   for (const char* size : {"0", "-1%", "one", "1 m"}) {
-    const ProgramResult bad =
-        mbverify("mutate scenarios/four_bar/turn_inverse.yaml --size '" + std::string(size) + "'");
+    const ProgramResult bad = mbverify("sensitivity scenarios/four_bar/turn_inverse.yaml --size '" +
+                                       std::string(size) + "'");
     EXPECT_EQ(bad.exit_code, 2) << size;
     EXPECT_NE(bad.err.find("violates: a percentage above 0"), std::string::npos) << bad.err;
   }
 }
 
 TEST_F(CliTest, MutateSharesItsWorkOutToProcesses) {
-  const std::string command = "mutate scenarios/four_bar/turn_inverse.yaml --no-search --json ";
+  const std::string command =
+      "sensitivity scenarios/four_bar/turn_inverse.yaml --no-search --json ";
   const std::string one = (mbverify.folder() / "1.json").string();
   const std::string two = (mbverify.folder() / "2.json").string();
   EXPECT_EQ(mbverify(command + one + " --jobs 1").exit_code, 0);
@@ -124,7 +125,7 @@ TEST_F(CliTest, MutateSharesItsWorkOutToProcesses) {
   shared.erase("wall_s");
   EXPECT_EQ(alone, shared);
   const ProgramResult bad = mbverify(
-      "mutate scenarios/four_bar/turn_inverse.yaml --jobs 2 --parameter roh --parameter x");
+      "sensitivity scenarios/four_bar/turn_inverse.yaml --jobs 2 --parameter roh --parameter x");
   EXPECT_EQ(bad.exit_code, 2);
   EXPECT_NE(bad.err.find("did you mean 'rho'?"), std::string::npos) << bad.err;
 }
@@ -451,8 +452,8 @@ TEST(TrustCommand, ProgramsOfOthersDoNotRunUnasked) {
     }
   }
   // Those that run no programs go on.
-  for (const char* command :
-       {"render CASE --out OUT/pictures --time 0", "mutate CASE --no-search", "converge CASE"}) {
+  for (const char* command : {"render CASE --out OUT/pictures --time 0",
+                              "sensitivity CASE --no-search", "converge CASE"}) {
     const ProgramResult other = theirs(command);
     EXPECT_EQ(other.err.find("may not run as you"), std::string::npos) << command << other.err;
     EXPECT_FALSE(theirs.ran()) << command;
@@ -540,9 +541,9 @@ TEST(Terminal, GetsNoEscapesAndNoEndlessValuesOfOthers) {
        {"run CASE --set simulation.mode=" + endless, "run CASE --set " + endless + "=1",
         "run " + endless, "run CASE --mode " + endless, "regress CASE --timeout " + endless,
         "run CASE --" + endless, endless, "regress CASE --shard " + endless,
-        "mutate CASE --size " + endless, "package CASE -o OUT.zip --date " + endless,
-        "verify " + endless, "run CASE --set " + endless, "trust " + endless, "merge " + endless,
-        "history list --history " + endless, "model " + endless}) {
+        "sensitivity CASE --size " + endless, "package CASE -o OUT.zip --date " + endless,
+        "package --check " + endless, "run CASE --set " + endless, "trust " + endless,
+        "merge " + endless, "history list --history " + endless, "model " + endless}) {
     const ProgramResult refused = theirs(words);
     EXPECT_EQ(refused.exit_code, 2) << words.substr(0, 40);
     EXPECT_LT((refused.out + refused.err).size(), 6000U) << words.substr(0, 40);

@@ -129,8 +129,8 @@ TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefused) {
   for (const std::string& call :
        {"model '" + model + "' --format mjcf --out '" + model + "'",
         "model '" + model + "' --format mjcf --out '" + In("own/other.yaml").string() + "'",
-        "mutate '" + scenario + "' --parameter crank --no-search --json '" + scenario + "'",
-        "mutate '" + scenario + "' --parameter crank --no-search --json '" +
+        "sensitivity '" + scenario + "' --parameter crank --no-search --json '" + scenario + "'",
+        "sensitivity '" + scenario + "' --parameter crank --no-search --json '" +
             In("own/link.json").string() + "'"}) {
     const ProgramResult result = mbverify(call);
     EXPECT_EQ(result.exit_code, 2) << call << result.err;
@@ -166,8 +166,8 @@ TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefusedBeforeAnythingIsComputed) {
     fs::remove(In("own/link.png"));
     fs::create_symlink(name, In("own/link.png"));
     for (const std::string& call :
-         {"mutate " + scenario + " --jobs 1 --json '" + input.string() + "'",
-          "mutate " + scenario + " --jobs 2 --json '" + input.string() + "'",
+         {"sensitivity " + scenario + " --jobs 1 --json '" + input.string() + "'",
+          "sensitivity " + scenario + " --jobs 2 --json '" + input.string() + "'",
           "render " + scenario + " --video '" + In("own/link.png").string() + "'"}) {
       const ProgramResult result = mbverify(call);
       EXPECT_EQ(result.exit_code, 2) << call << result.err;

@@ -26,12 +26,15 @@ std::vector<std::string> LinesOf(const std::string& text) {
 
 class HelpTest : public testing::Test {
  protected:
-  // Names below "Subcommands:" of a command's help, with the command before them.
+  // Names below the headings of a command's help, with the command before them.
   std::vector<std::string> Below(const std::string& command) const {
     std::vector<std::string> names;
     bool inside = false;
+    static const std::set<std::string> kHeadings = {
+        "Subcommands:",       "Start:",   "Verify:",  "Understand:",
+        "Robots and motors:", "Engines:", "Publish:", "Shell:"};
     for (const std::string& line : LinesOf(mbverify(command + " --help").out)) {
-      inside = line == "Subcommands:" || (inside && line.starts_with("  "));
+      inside = kHeadings.contains(line) || (inside && line.starts_with("  "));
       const bool is_name = inside && line.starts_with("  ") && line.size() > 2 && line[2] != ' ';
       if (is_name) {
         names.push_back((command.empty() ? "" : command + " ") +
@@ -189,7 +192,7 @@ TEST_F(HelpTest, ParametersAndOutputsAreFoundFromAMisspelling) {
            {"stiffness scara_robot --set K_acd=1", "K_act"},
            {"stiffness scara_robot --output platfrom", "platform"},
            {"stiffness scara_robot --at platfrm.x=0", "platform.x"},
-           {"mutate four_bar/turn_inverse --parameter roh", "rho"},
+           {"sensitivity four_bar/turn_inverse --parameter roh", "rho"},
            {"run four_bar/turn --set parameters.cranc=0.1", "crank"},
            {"run four_bar/turn --set motion.commands.moter=0", "motor"},
            {"render four_bar/turn --set parameters.cranc=0.1", "crank"},
@@ -202,6 +205,64 @@ TEST_F(HelpTest, ParametersAndOutputsAreFoundFromAMisspelling) {
     EXPECT_NE(result.err.find("did you mean '" + hint + "'?"), std::string::npos)
         << arguments << ": " << result.err;
   }
+}
+
+TEST_F(HelpTest, CommandsStandUnderHeadingsAndAreListedWithoutAny) {
+  const ProgramResult alone = mbverify("");
+  EXPECT_EQ(alone.exit_code, 2) << "nothing was verified";
+  EXPECT_EQ(alone.out, mbverify("--help").out);
+  EXPECT_EQ(mbverify("help").out, alone.out);
+  EXPECT_LT(alone.out.find("\nVerify:\n  run "), alone.out.find("\nUnderstand:\n"));
+  EXPECT_EQ(Below("").size(), 25u) << "a new command has a heading";
+  EXPECT_EQ(mbverify("-V").out, mbverify("--version").out);
+}
+
+TEST_F(HelpTest, HelpOfACommandIsItsHelp) {
+  for (const char* command : {"run", "history compare"}) {
+    const ProgramResult help = mbverify(std::string("help ") + command);
+    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_EQ(help.out, mbverify(command + std::string(" --help")).out);
+  }
+  const ProgramResult none = mbverify("help history comqare");
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_EQ(none.err,
+            "error: there is no command 'mbverify history comqare'\n"
+            "  hint: did you mean 'compare'?\n");
+}
+
+TEST_F(HelpTest, WrongOptionsAreErrorsWithTheUsage) {
+  EXPECT_EQ(mbverify("sensitivity").err,
+            "error: scenario is required\nusage: mbverify sensitivity [OPTIONS] scenario\n"
+            "  hint: see mbverify sensitivity --help\n");
+  EXPECT_TRUE(mbverify("package --check a.zip b.yaml").err.starts_with("error: --check excludes"));
+  EXPECT_TRUE(mbverify("package").err.starts_with("error: scenario, or --check is required\n"));
+  EXPECT_TRUE(mbverify("crosscheck x --program y").err.starts_with("error: --program requires"));
+}
+
+TEST_F(HelpTest, FormerNamesOfCommandsStillWorkButAreNotShown) {
+  for (const char* name : {"mutate", "upgrade", "verify"}) {
+    EXPECT_EQ(mbverify("--help").out.find(std::string("\n  ") + name), std::string::npos) << name;
+    EXPECT_EQ(mbverify(std::string(name) + " nowhere.yaml").exit_code, 2);
+  }
+  const std::string call = " four_bar/turn_inverse --parameter rho --no-search";
+  const ProgramResult former = mbverify("mutate" + call), now = mbverify("sensitivity" + call);
+  EXPECT_EQ(former.exit_code, now.exit_code);
+  EXPECT_NE(now.out.find("rho"), std::string::npos);
+  const ProgramResult scenario = mbverify("verify scenarios/four_bar/turn.yaml");
+  EXPECT_EQ(scenario.exit_code, 2);
+  EXPECT_NE(scenario.err.find("hint: mbverify run scenarios/four_bar/turn.yaml"), std::string::npos)
+      << scenario.err;
+}
+
+TEST_F(HelpTest, ColourIsForcedAndRefusedByVariables) {
+  const std::string call =
+      "run four_bar/turn_inverse --no-pictures --no-report --out " + mbverify.Out();
+  const auto with = [&](const std::string& variables) {
+    return mbverify.Script("env " + variables + " \"$mbverify\" " + call).out;
+  };
+  EXPECT_EQ(with("A=b").find('\x1b'), std::string::npos);
+  EXPECT_NE(with("FORCE_COLOR=1").find("\x1b[1;32mAGREE"), std::string::npos);
+  EXPECT_EQ(with("FORCE_COLOR=1 NO_COLOR=1").find('\x1b'), std::string::npos);
 }
 
 TEST_F(HelpTest, ScenariosAreFoundByTheirNames) {

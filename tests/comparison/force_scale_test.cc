@@ -303,6 +303,12 @@ TEST(ForceScaleTerms, DrivesAreCarriedByTheBodiesThatTheyMove) {
     EXPECT_TRUE(apart.carries[d][d]);
     EXPECT_FALSE(apart.carries[d][1 - d]);
   }
+  // Little beside the body that a drive moves most, wherever that is in the row, is round-off.
+  DrivenTwists twists = TwistsFor(c.Input());
+  twists.V_WB[1][1] = 1e-12 * twists.V_WB[1][2];
+  ComparisonInput input = c.Input();
+  input.twists = &twists;
+  EXPECT_FALSE(ForceScaleOf(input, c.analytic).carries[0][1]);
   const Case in_a_row;
   const ForceScale row = ForceScaleOf(in_a_row.Input(), in_a_row.analytic);
   EXPECT_TRUE(row.carries[1][0]) << "d1 moves what weighs on d2";

@@ -241,7 +241,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"check", "check scenarios/slider_crank/turn.yaml --json OUT/c.json", 0},
         {"list", "list --json OUT/l.json", 1},
         {"init", "init mine --into OUT", 0},
-        {"mutate", "mutate four_bar/turn_inverse --json OUT/m.json", 2},
+        {"mutate", "sensitivity four_bar/turn_inverse --json OUT/m.json", 2},
         {"size", "size scenarios/slider_crank/motor.yaml --json OUT/s.json", 0},
         {"package", "package scenarios/slider_crank/turn.yaml -o OUT/p.zip", 4}}),
     [](const auto& info) { return std::string(info.param.name); });

@@ -269,6 +269,23 @@ TEST(Constraints, APointTwoMetresAboveAnotherIsTwoMetresAway) {
   EXPECT_TRUE(row.J_child.tail<3>().isApprox(Vec3::UnitZ()));
 }
 
+TEST(Constraints, ACouplingIsTheSumOfItsPieces) {
+  Mechanism m;
+  m.bodies.resize(2);
+  Joint hinge;
+  hinge.kind = JointKind::kRevolute;
+  hinge.child = 1;
+  m.joints = {hinge};
+  m.couplings = {{.name = "cam", .terms = {{0, 0, {2.0, 0.5}}}, .constant = -0.7}};
+  BodyStates states;
+  states.Resize(2);
+  states.X_WB[1].linear() = RotZ(0.3);
+  const CouplingRow row = CouplingRows(m, states).at(0);
+  EXPECT_NEAR(row.value, 2.0 * 0.3 + 0.5 * 0.09 - 0.7, 1e-15);
+  ASSERT_EQ(row.pieces.size(), 1u);
+  EXPECT_NEAR(row.pieces[0].value, row.value, 1e-15);
+}
+
 TEST(Constraints, TheRotationGapSeesABackwardAxisThatTheCosinesMiss) {
   const auto [joint, at_home] = HingeOnTheWorld();
   BodyStates s = at_home;

@@ -150,6 +150,18 @@ TEST(Couplings, AreWrittenAsTheyAreRead) {
   }
 }
 
+TEST(Couplings, ASumIsWrittenWithTheSignOfItsOffset) {
+  const LoadResult loaded = LoadModelText(
+      Model("  sum: {sum: [{joint: turn, factor: 2}, {joint: slide, coordinate: 1, factor: 3}], "
+            "offset: 0.75}\n"),
+      "m.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const LoadResult again = LoadModelText(WriteModel(*loaded.mechanism), "again.yaml");
+  ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
+  ASSERT_EQ(again.mechanism->couplings.size(), 1u);
+  EXPECT_EQ(again.mechanism->couplings[0].constant, -0.75);
+}
+
 // Three shafts; `guess` and coupling texts as given, the motor on one of them.
 Mechanism Shafts(const std::string& guess_one, const std::string& guess_two,
                  const std::string& couplings, const std::string& motor) {

@@ -147,6 +147,8 @@ const Slip kSlips[] = {
      "'base' moves the same coordinate of joint 'A' as 'motor'"},
     {"DriveOrder",
      "outputs:", "drive_order: [motor, moto]\noutputs:", "drive_order = 'moto' is not one of: "},
+    {"SymbolOfNoDrive",
+     "outputs:", "symbols: {moto: \"_{1}\"}\noutputs:", "symbols: there is no drive 'moto'"},
     {"DriveOrderGap", "outputs:", "drive_order: []\noutputs:", "drive_order leaves out 'motor'"},
     {"Spring", "outputs:", "springs: {s: {from: world, to: crank.end, stiffness: -1}}\noutputs:",
      "springs.s.stiffness = -1 violates stiffness >= 0"},

@@ -241,7 +241,11 @@ TEST(LoadModel, AnOverrideMayNameAnInstancesParameter) {
 }
 
 TEST(LoadModel, DriveOrderMayBeFixed) {
-  const Mechanism m = MustLoad(std::string(kParts) + "drive_order: [two.motor, one.motor]\n");
+  const Mechanism m = MustLoad(std::string(kParts) +
+                               "drive_order: [two.motor, one.motor]\n"
+                               "symbols: {one.motor: \"_{1}\"}\n");
+  EXPECT_EQ(m.drives[1].symbol, "_{1}");
+  EXPECT_EQ(m.drives[0].symbol, "");
   EXPECT_EQ(m.drives[0].name, "two.motor");
 }
 

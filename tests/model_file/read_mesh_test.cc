@@ -13,6 +13,7 @@
 
 #include "base/inputs.h"
 #include "model_file/mesh/mass_properties.h"
+#include "tests/support/sanitized.h"
 #include "tests/support/solids.h"
 #include "tests/support/test_folder.h"
 
@@ -182,7 +183,8 @@ TEST(ReadMesh, SmallFilesThatAskForMuchAreRefused) {
       {"vcount.dae",
        in_dae("<triangles count=\"4\">", "<polylist count=\"4\"><vcount>3 a</vcount>"),
        "something else"},
-      {"nodes.dae", laughs, "damaged|more memory"},
+      // Without a limit of memory the one of time ends it.
+      {"nodes.dae", laughs, test::kSanitized ? "damaged|longer than" : "damaged|more memory"},
       {"polygon.obj", polygon + "f" + corners + "\n", "16000 corners"},
       {"index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 2000000000\n", "damaged|not there"},
       {"count.stl", std::string(80, 'x') + "\xff\xff\xff\x7f" + std::string(100, '\0'), "damaged"}};

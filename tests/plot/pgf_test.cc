@@ -75,7 +75,10 @@ TEST(Pgf, MapsArePicturesOfTheirOwn) {
   ASSERT_EQ(files.size(), 3u);
   EXPECT_THAT(files[0].second, testing::HasSubstr("ymax=1] {map_map.png};"));
   EXPECT_THAT(files[0].second, testing::HasSubstr("{map_map2.png};"));
-  EXPECT_THAT(files[0].second, testing::HasSubstr("point meta min=1, point meta max=3"));
+  // The bar's ends are those of the colours: 10 at its foot, 1000 at its head.
+  for (const char* label : {"10^{1}", "10^{2}", "10^{3}"}) {
+    EXPECT_THAT(files[0].second, testing::HasSubstr(") {" + ToTex(label) + "};"));
+  }
   EXPECT_THAT(files[0].second, testing::HasSubstr("axis on top"));  // white hides no axis
   EXPECT_EQ(files[1].first, "map_map.png");
   EXPECT_EQ(files[2].first, "map_map2.png");

@@ -143,6 +143,34 @@ TEST(SvgPlot, BarsAreAsLongAsTheirShares) {
             "</svg>\n");
 }
 
+TEST(SvgPlot, AnAreaLiesBetweenItsCurvesAndItsRangeCounts) {
+  LinePlot plot{.title = "t", .x_label = "x", .y_label = "y", .lines = {}};
+  plot.lines.push_back({.label = "m", .points = {{0, 1}, {1, 1}}, .dashed = true});
+  plot.areas.push_back({"band", {0, 1}, {0, 0.5}, {2, 1.5}});
+  const std::string svg = ToSvg(plot);
+  // 0 … 2 with 4 % at both ends on 416 px above y = 460; 0 … 1 likewise on 612 px from x = 84.
+  const auto at = [](double x, double y) {
+    return fmt::format("{:.2f} {:.2f}", 84 + (x + 0.04) / 1.08 * 612,
+                       460 - (y + 0.08) / 2.16 * 416);
+  };
+  EXPECT_NE(
+      svg.find(fmt::format("d=\"M{} L{} L{} L{} Z\"", at(0, 2), at(1, 1.5), at(1, 0.5), at(0, 0))),
+      std::string::npos)
+      << svg;
+  EXPECT_LT(svg.find("fill-opacity"), svg.find("stroke-dasharray")) << "lines above the area";
+  EXPECT_NE(svg.find(">band</text>"), std::string::npos);
+}
+
+TEST(SvgPlot, IntervalsOfBarsEndWhereTheirNumbersDo) {
+  const BarPlot plot{.title = "i",
+                     .columns = {"first"},
+                     .rows = {{"a", {0.5}, {{0.25, 1.0}}}, {"b", {0.25}, {{-0.5, 0.5}}}}};
+  const std::string svg = ToSvg(plot);
+  // 1.0, the largest end, is 160 px long; nothing is left of the axis at 190.
+  EXPECT_NE(svg.find("d=\"M230.0 29v8M230.0 33H350.0M350.0 29v8\""), std::string::npos) << svg;
+  EXPECT_NE(svg.find("d=\"M190.0 49v8M190.0 53H270.0M270.0 49v8\""), std::string::npos) << svg;
+}
+
 TEST(SvgPlot, ContoursRunBetweenTheMiddlesOfCells) {
   MapPlot plot{.title = "m",
                .x_label = "x",

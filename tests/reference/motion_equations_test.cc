@@ -89,5 +89,32 @@ TEST(MotionEquations, RowsThatAreNotIndependentAreGivenBack) {
   EXPECT_FALSE(equations.chosen());
 }
 
+// What tells a row from one nearly like it may be round-off, though it can be solved for.
+TEST(MotionEquations, RowsThatAreNearlyDependentAreGivenBack) {
+  const Mechanism mechanism = Shipped("slider_crank");
+  BodyStates states;
+  states.Resize(mechanism.bodies.size());
+  states.X_WB = mechanism.X_WB_home;
+  const auto size = 6 * static_cast<Eigen::Index>(mechanism.bodies.size() - 1);
+  for (const auto& [apart, independent] : {std::pair{1e-2, true}, {1e-11, false}}) {
+    RowSet rows;
+    for (const Joint& joint : mechanism.joints) {
+      if (joint.closure) continue;
+      const ConstraintRows of = RowsOf(joint, states, false);
+      rows.Add(of, of.rows);
+    }
+    rows.Add(RowsOf(mechanism.joints[0], states, false), 1);
+    rows.J.back() += apart * (Vec6() << 1, 2, 3, 4, 5, 6).finished();
+    MotionEquations equations(mechanism, 1.0);
+    std::vector<int> all;
+    for (int i = 0; i < rows.size(); ++i) all.push_back(i);
+    equations.Choose(all);
+    VecX A;
+    EXPECT_EQ(equations.Solve(states, rows, VecX::Ones(size), VecX::Zero(rows.size()), &A),
+              independent)
+        << apart;
+  }
+}
+
 }  // namespace
 }  // namespace mbv::internal

@@ -122,8 +122,9 @@ Mechanism WithLegs(bool balls, const std::string& along) {
                           ", across: 0.006}, upper: {mass: 1, com: 0.11, along: " + along +
                           ", across: 0.004}}\n";
   std::string world = "world: {frames: {", platform;
+  const auto legs = Legs();
   for (int i = 0; i < 6; ++i) {
-    const Leg& at = Legs()[static_cast<size_t>(i)];
+    const Leg& at = legs[static_cast<size_t>(i)];
     const auto point = [&](const char* name, const Vec3& p) {
       return fmt::format("{}{}: [{:.17g}, {:.17g}, {:.17g}], ", name, i + 1, p.x(), p.y(), p.z());
     };

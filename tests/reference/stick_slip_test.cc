@@ -625,6 +625,24 @@ TEST(DeadCentre, SlidersThatRubByTheirLoadsFollowTheirEquationOfMotion) {
   }
 }
 
+// A slider that rests at its dead centre is not held there: it rubs as soon as the motor begins to
+// turn the crank, however late.
+TEST(DeadCentre, ASliderThatRestsThereRubsOnceTheMotorTurns) {
+  const double force = 0.5;
+  Mechanism m = Boxer{}.Make(0.0);
+  m.gravity_W.setZero();
+  AddDryFriction(&m, Boxer::Guide(0), force);
+  Motion motion = FreeMotion(m, 0.0, 0.0, 0.5);
+  motion.forces[0].force = {{BumpTerm{.start_s = 0.2, .duration_s = 0.2, .height = 0.1}}};
+  const ForwardRun run = RunForwardReference(m, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const double q = ColumnOf(run.trace, "motor.position").tail<1>()[0];
+  ASSERT_GT(q, 0.4);
+  ASSERT_LT(q, kPi);
+  EXPECT_NEAR(ColumnOf(run.trace, "dampers.work").tail<1>()[0],
+              -force * (Boxer::Half(0.0).x - Boxer::Half(q).x), kFollowed);
+}
+
 // Random systems, with more elements than DOFs as well: what is found is the least of (2).
 TEST(RestDecision, FindsTheLeastOfGauss) {
   std::mt19937_64 random(20261122);

@@ -157,6 +157,17 @@ TEST(TableGrid, RowsOffTheGridAreInterpolatedFromBothSides) {
   EXPECT_GT(inside, 90);
 }
 
+// 9.500, 10.50, 11.50 … with four digits: a sample has the last digit of the row next to it.
+TEST(TableGrid, ASampleOffTheGridHasTheStepOfTheNearestRow) {
+  const double h = 0.0101;
+  const ReferenceTable table =
+      Sampled(11, h, "%.3e", [&](double t) { return 9.5 + std::round(t / h); });
+  const AlignedTable aligned = AlignTable(table, Seconds(0.1, 0.01));
+  ASSERT_TRUE(aligned.interpolated);
+  EXPECT_NEAR(aligned.standard(0, 0), 1e-3 / std::sqrt(12.0), 1e-9);
+  EXPECT_NEAR(aligned.standard(1, 0), 1e-2 / std::sqrt(12.0), 1e-9);
+}
+
 TEST(TableGrid, RowsOutsideTheMotionAreLeftOutAndNamed) {
   const AlignedTable aligned = AlignTable(Sampled(101, 0.01, "%.6f", Sine), Seconds(0.5, 0.01));
   EXPECT_EQ(aligned.trace.time_s.size(), 51u);

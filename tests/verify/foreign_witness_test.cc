@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "features/run/run_scenario.h"
 #include "report/plot_points.h"
+#include "tests/support/sanitized.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_folder.h"
 #include "verify/program_call.h"
@@ -370,6 +371,12 @@ TEST(ForeignWitness, WithoutOthersVerifiesWhatItCan) {
 }
 
 #ifdef MBV_SIMBODY
+// `more`: further settings. A build with sanitizers cannot live within a limit of memory.
+SetValue Simbody(const std::string& more = "") {
+  return {"witnesses", fmt::format("{{simbody: {{{}memory_mb: {}, command: [{}]}}}}", more,
+                                   test::kSanitized ? 1e9 : 4000, MBV_SIMBODY)};
+}
+
 // Another engine with its own mathematics, on trees and closures of every kind that it knows.
 TEST(ForeignWitness, SimbodyAgrees) {
   for (const char* scenario :
@@ -377,8 +384,7 @@ TEST(ForeignWitness, SimbodyAgrees) {
         "scara_robot/default", "cabin_robot/default"}) {
     RunOptions options;
     options.pictures = false;
-    options.scenario.set = {
-        {"witnesses", std::string("{simbody: {command: [") + MBV_SIMBODY + "]}}"}};
+    options.scenario.set = {Simbody()};
     const RunOutcome outcome =
         RunScenario(SourcePath(std::string("/scenarios/") + scenario + ".yaml"), options);
     ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
@@ -397,8 +403,7 @@ TEST(ForeignWitness, SimbodyMovesFreely) {
     RunOptions options;
     options.out_dir.clear();
     options.pictures = options.page = false;
-    options.scenario.set = {
-        {"witnesses", std::string("{simbody: {limits: stepped, command: [") + MBV_SIMBODY + "]}}"}};
+    options.scenario.set = {Simbody("limits: stepped, ")};
     if (!density.empty()) options.scenario.set.emplace_back("simulation.parameters.rho", density);
     return RunScenario(SourcePath(std::string("/scenarios/") + scenario + ".yaml"), options);
   };
@@ -426,8 +431,7 @@ TEST(ForeignWitness, SimbodyMovesFreely) {
 TEST(ForeignWitness, SimbodyDeclinesFriction) {
   RunOptions options;
   options.pictures = false;
-  options.scenario.set = {
-      {"witnesses", std::string("{simbody: {command: [") + MBV_SIMBODY + "]}}"}};
+  options.scenario.set = {Simbody()};
   const RunOutcome outcome =
       RunScenario(SourcePath("/scenarios/rubbing_five_bar/dwell_inverse.yaml"), options);
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();

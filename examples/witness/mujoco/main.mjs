@@ -2,7 +2,7 @@
 //
 //   mbverify-witness-mujoco              stiff equalities, rates in the drives' targets
 //   mbverify-witness-mujoco --defaults   MuJoCo's default softness, positions as targets
-//   mbverify-witness-mujoco --rows       instead: rows of the model at given states (mbverify upgrade)
+//   mbverify-witness-mujoco --rows       instead: rows of the model at given states (mbverify crosscheck --newest)
 //
 // mbverify calls it in a folder of its own (docs/how-to/external_solvers.md).
 import fs from 'node:fs';

@@ -15,6 +15,7 @@
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "comparison/verdict.h"
+#include "features/engines/upgrade.h"
 #include "features/run/run_scenario.h"
 #include "report/page.h"
 
@@ -213,6 +214,8 @@ struct CrosscheckArguments {
                                       "mujoco_newest=mbverify-witness-mujoco",
                                       "mujoco_newest_default=mbverify-witness-mujoco --defaults"};
   std::string markdown, csv, html;
+  bool newest = false;
+  std::string program;  ///< with newest
   JsonOption json;
 };
 
@@ -267,6 +270,9 @@ int AddRows(const std::string& file, const RunOptions& options, std::vector<Cros
 }
 
 int RunCrosscheck(const CrosscheckArguments& arguments) {
+  if (arguments.newest) {
+    return RunUpgrade({arguments.scenarios, arguments.set, arguments.program, arguments.json});
+  }
   RunOptions options;
   options.out_dir.clear();
   options.pictures = options.page = false;
@@ -295,16 +301,26 @@ void AddCrosscheckCommand(CLI::App* app, int* exit_code) {
       "crosscheck", "Engines side by side on scenarios: force error, loop gap, cost");
   crosscheck->add_option("scenarios", arguments->scenarios, "scenario files or folders")
       ->required();
+  CLI::Option* newest = crosscheck->add_flag(
+      "--newest", arguments->newest,
+      "what the newest MuJoCo changes for the scenarios' models, row by row, and why");
+  crosscheck
+      ->add_option("--program", arguments->program,
+                   "runs the other version, in place of mbverify-witness-mujoco")
+      ->needs(newest);
   crosscheck
       ->add_option("--engine", arguments->engines,
                    "NAME=COMMAND: a foreign witness (repeatable), see "
                    "docs/how-to/external_solvers.md; Simbody and "
                    "the newest MuJoCo in two ways if left out")
-      ->allow_extra_args(false);
-  crosscheck->add_option("--markdown", arguments->markdown,
-                         "writes forces, poses, loop gaps and cost as tables, a column per engine");
-  crosscheck->add_option("--csv", arguments->csv, "writes all rows as CSV");
-  crosscheck->add_option("--html", arguments->html, "writes all rows as a page");
+      ->allow_extra_args(false)
+      ->excludes(newest);
+  crosscheck
+      ->add_option("--markdown", arguments->markdown,
+                   "writes forces, poses, loop gaps and cost as tables, a column per engine")
+      ->excludes(newest);
+  crosscheck->add_option("--csv", arguments->csv, "writes all rows as CSV")->excludes(newest);
+  crosscheck->add_option("--html", arguments->html, "writes all rows as a page")->excludes(newest);
   arguments->json.AddTo(crosscheck);
   crosscheck
       ->add_option("--set", arguments->set,
@@ -312,8 +328,9 @@ void AddCrosscheckCommand(CLI::App* app, int* exit_code) {
       ->allow_extra_args(false);
   SetFooter(crosscheck,
             {"crosscheck scenarios/four_bar/turn_inverse.yaml",
-             "crosscheck mine.yaml --engine 'mine=python3 my_engine.py' --markdown table.md"},
-            "0 a table was made, whatever it says; 2 bad input, 3 a scenario could not run, 4 "
+             "crosscheck mine.yaml --engine 'mine=python3 my_engine.py' --markdown table.md",
+             "crosscheck mine.yaml --newest --json -"},
+            "0 compared, whatever differs; 2 bad input, 3 a scenario could not run, 4 "
             "internal error");
   crosscheck->callback([arguments, exit_code] { *exit_code = RunCrosscheck(*arguments); });
 }

@@ -393,15 +393,9 @@ std::vector<RowChange> CompareRows(const RowSurvey& survey, const RowAnswer& ans
   return changes;
 }
 
-// mbverify upgrade
+// mbverify crosscheck --newest
 
 namespace {
-
-struct UpgradeArguments {
-  std::vector<std::string> scenarios, set;
-  std::string program;
-  JsonOption json;
-};
 
 // One scenario; its exit code.
 int RunUpgrade(const std::string& file, const UpgradeArguments& arguments, UpgradeOptions* options,
@@ -423,6 +417,8 @@ int RunUpgrade(const std::string& file, const UpgradeArguments& arguments, Upgra
   return outcome.exit_code;
 }
 
+}  // namespace
+
 int RunUpgrade(const UpgradeArguments& arguments) {
   UpgradeOptions options;
   if (!arguments.program.empty()) options.command = {arguments.program};
@@ -439,23 +435,14 @@ int RunUpgrade(const UpgradeArguments& arguments) {
   return WorseExit(exit_code, arguments.json.Write(ToJson(reports), {}));
 }
 
-}  // namespace
-
+// The command's former name; help does not show it.
 void AddUpgradeCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<UpgradeArguments>();
-  CLI::App* upgrade = app->add_subcommand(
-      "upgrade", "What the newest MuJoCo changes for the scenarios' models, and why");
+  CLI::App* upgrade = app->add_subcommand("upgrade", "crosscheck --newest");
   upgrade->add_option("scenarios", arguments->scenarios, "scenario files or folders")->required();
-  upgrade->add_option("--program", arguments->program,
-                      "runs the other version, in place of mbverify-witness-mujoco");
+  upgrade->add_option("--program", arguments->program, "as of crosscheck");
   arguments->json.AddTo(upgrade);
-  upgrade
-      ->add_option("--set", arguments->set,
-                   "key=value: overrides a value of the scenarios (repeatable)")
-      ->allow_extra_args(false);
-  SetFooter(upgrade, {"upgrade scenarios/spr_tripod/default.yaml", "upgrade mine.yaml --json -"},
-            "0 compared, whatever differs; 2 bad input, 3 the scenario or the other version could "
-            "not run, 4 internal error");
+  upgrade->add_option("--set", arguments->set, "as of crosscheck")->allow_extra_args(false);
   upgrade->callback([arguments, exit_code] { *exit_code = RunUpgrade(*arguments); });
 }
 

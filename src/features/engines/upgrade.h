@@ -9,6 +9,7 @@
 
 #include "base/diagnostics.h"
 #include "base/types.h"
+#include "cli/options.h"
 #include "external/motion_text.h"
 #include "scenario/load_scenario.h"
 #include "simulation/engine/row_survey.h"
@@ -63,6 +64,15 @@ struct UpgradeOutcome {
   std::string failure;                  ///< why it could not run; "" otherwise
   std::optional<UpgradeReport> report;  ///< with exit code 0, and with 3 if the program said why
 };
+
+/// What `crosscheck --newest` is asked.
+struct UpgradeArguments {
+  std::vector<std::string> scenarios, set;
+  std::string program;
+  JsonOption json;
+};
+/// Its exit code.
+[[nodiscard]] int RunUpgrade(const UpgradeArguments& arguments);
 
 /// Of commanded motions, by the reference's forces.
 [[nodiscard]] UpgradeOutcome Upgrade(const std::string& file, const UpgradeOptions& options);

@@ -1,4 +1,4 @@
-// mbverify mutate
+// mbverify sensitivity
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -80,7 +80,7 @@ std::optional<MutationOptions> OptionsOf(const MutateArguments& arguments) {
 std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
                                    const std::string& json, const std::string& progress) {
   std::vector<std::string> argv = {"/proc/self/exe",
-                                   "mutate",
+                                   "sensitivity",
                                    arguments.scenario,
                                    "--size",
                                    arguments.size,
@@ -229,11 +229,13 @@ int Mutate(MutateArguments arguments) {
 
 }  // namespace
 
-void AddMutateCommand(CLI::App* app, int* exit_code) {
+namespace {
+
+CLI::App* AddCommand(const std::string& name, CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<MutateArguments>();
   arguments->jobs = AllCores();
   CLI::App* mutate = app->add_subcommand(
-      "mutate",
+      name,
       "Perturb each number of the simulated side and put structural faults into it: which errors "
       "would be noticed, and down to which size?");
   mutate->add_option("scenario", arguments->scenario, "scenario file that agrees")->required();
@@ -266,10 +268,20 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
   arguments->json.AddTo(mutate);
   SetFooter(
       mutate,
-      {"mutate scenarios/stabilizing_platform/sea_state.yaml --size 1%",
-       "mutate scenarios/four_bar/turn_inverse.yaml --parameter rho --no-search"},
+      {"sensitivity scenarios/stabilizing_platform/sea_state.yaml --size 1%",
+       "sensitivity scenarios/four_bar/turn_inverse.yaml --parameter rho --no-search"},
       "0 everything that matters is detected, 1 some is missed, 2 bad input, 3 could not run");
   mutate->callback([arguments, exit_code] { *exit_code = Mutate(*arguments); });
+  return mutate;
 }
+
+}  // namespace
+
+void AddSensitivityCommand(CLI::App* app, int* exit_code) {
+  AddCommand("sensitivity", app, exit_code);
+}
+
+// The command's former name; help does not show it.
+void AddMutateCommand(CLI::App* app, int* exit_code) { AddCommand("mutate", app, exit_code); }
 
 }  // namespace mbv

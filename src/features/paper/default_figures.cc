@@ -73,14 +73,25 @@ class FigureMaker {
     }
   }
 
+  // "*F*_{1}" of a drive that has a symbol, else its name.
+  [[nodiscard]] std::string NameOf(const std::string& drive, const std::string& letter) const {
+    for (size_t d = 0; d < report_.symbols.size(); ++d) {
+      if (report_.drives[d] == drive && !report_.symbols[d].empty()) {
+        return letter + report_.symbols[d];
+      }
+    }
+    return AsPlainText(drive);
+  }
+
   // A quantity of drives over time: lines of one witness, markers of the others.
-  FigurePanel DrivePanel(Quantity quantity, const std::vector<std::string>& drives,
-                         const ShownUnit& unit, bool legend) const {
+  FigurePanel DrivePanel(Quantity quantity, const std::string& letter,
+                         const std::vector<std::string>& drives, const ShownUnit& unit,
+                         bool legend) const {
     FigurePanel panel{.x = TimeAxis()};
     std::vector<SignalRow> rows;
     rows.reserve(drives.size());
     for (const std::string& drive : drives) {
-      rows.push_back({ChannelName(quantity, drive), AsPlainText(drive)});
+      rows.push_back({ChannelName(quantity, drive), NameOf(drive, letter)});
     }
     AddOverTime(rows, ShownWitnesses(report_), line_, {time_, unit, language_, legend}, &panel);
     return panel;
@@ -140,7 +151,7 @@ class FigureMaker {
     const ShownUnit unit = UsualUnit(si, largest);
     const std::string symbol = Turns(si) ? "τ" : "F";
     Figure figure{.name = name, .common_x = true};
-    figure.panels.push_back(DrivePanel(Quantity::kForce, drives, unit, true));
+    figure.panels.push_back(DrivePanel(Quantity::kForce, "*" + symbol + "*", drives, unit, true));
     figure.panels[0].y.label =
         AxisLabel(In(Turns(si) ? FigureWord::kDriveTorque : FigureWord::kDriveForce),
                   "*" + symbol + "*", unit.shown);
@@ -174,7 +185,7 @@ class FigureMaker {
         largest = std::max(largest, mbv::LargestOf(report_, ChannelName(quantity, drive)));
       }
       const ShownUnit unit = UsualUnit(si, largest);
-      FigurePanel panel = DrivePanel(quantity, drives, unit, figure.panels.empty());
+      FigurePanel panel = DrivePanel(quantity, symbol, drives, unit, figure.panels.empty());
       panel.y.label = AxisLabel(In(word), symbol, unit.shown);
       panel.share = 0.8;
       figure.panels.push_back(std::move(panel));
@@ -266,7 +277,7 @@ class FigureMaker {
       const VecX power = line_->trace.values.col(force).cwiseProduct(line_->trace.values.col(rate));
       total += power;
       powers.push_back(OverTime(line_->trace, power));
-      names.push_back(AsPlainText(drive));
+      names.push_back(NameOf(drive, "*P*"));
     }
     const bool sum_only = powers.size() >= kMostCurves;
     if (sum_only) {
@@ -338,9 +349,10 @@ class FigureMaker {
       for (Eigen::Index i = 0; i < trace.values.rows(); i += stride) {
         points.emplace_back(x.factor * trace.values(i, v), y.factor * trace.values(i, f));
       }
-      panel.curves.push_back({.label = drives.size() > 1 ? AsPlainText(drives[d]) : "",
-                              .points = points,
-                              .look = static_cast<int>(d)});
+      panel.curves.push_back(
+          {.label = drives.size() > 1 ? NameOf(drives[d], turns ? "*τ*" : "*F*") : "",
+           .points = points,
+           .look = static_cast<int>(d)});
     }
     panel.x.label = AxisLabel(In(turns ? FigureWord::kDriveRate : FigureWord::kDriveSpeed),
                               turns ? "*ω*" : "*v*", x.shown);

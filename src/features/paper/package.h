@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/diagnostics.h"
+#include "cli/options.h"
 #include "features/paper/package_manifest.h"
 #include "verify/program_consent.h"
 #include "verify/run_witnesses.h"
@@ -32,6 +33,15 @@ struct PackageOutcome {
 /// archive will. The same inputs give the same bytes.
 [[nodiscard]] PackageOutcome MakePackage(const std::vector<std::string>& scenarios,
                                          const PackageOptions& options);
+
+/// What `mbverify package --check` is asked.
+struct ArchiveArguments {
+  std::string archive;
+  bool trust = false, verbose = false;
+  JsonOption json;
+};
+/// Repeats what the archive holds, and says which results are the same. Its exit code.
+[[nodiscard]] int CheckArchive(const ArchiveArguments& arguments);
 
 /// Whether a date is one of the calendar, written YYYY-MM-DD.
 [[nodiscard]] bool IsDate(const std::string& text);

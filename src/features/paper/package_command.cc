@@ -109,26 +109,46 @@ int Package(const PackageArguments& arguments) {
 
 void AddPackageCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<PackageArguments>();
+  auto archive = std::make_shared<ArchiveArguments>();
   CLI::App* package = app->add_subcommand(
       "package", "An archive beside a paper: inputs, results, figures, and how to repeat them");
+  CLI::Option* check =
+      package->add_option("--check", archive->archive,
+                          "repeat what this archive holds, and say which results are the same");
   package
       ->add_option("scenario", arguments->scenarios,
                    "scenario files or folders of them, and study files")
-      ->required();
-  package->add_option("-o,--out", arguments->out, "the archive")->capture_default_str();
-  package->add_option("--date", arguments->date,
-                      "YYYY-MM-DD that it says it was published; else that of SOURCE_DATE_EPOCH");
-  package->add_flag("--no-report", arguments->no_report, "without report.html");
-  package->add_flag("--no-figures", arguments->no_figures, "without figures");
-  package->add_flag("--force", arguments->force, "replace a file of this name");
+      ->excludes(check);
+  package->add_option("-o,--out", arguments->out, "the archive")
+      ->capture_default_str()
+      ->excludes(check);
+  package
+      ->add_option("--date", arguments->date,
+                   "YYYY-MM-DD that it says it was published; else that of SOURCE_DATE_EPOCH")
+      ->excludes(check);
+  package->add_flag("--no-report", arguments->no_report, "without report.html")->excludes(check);
+  package->add_flag("--no-figures", arguments->no_figures, "without figures")->excludes(check);
+  package->add_flag("--force", arguments->force, "replace a file of this name")->excludes(check);
+  package
+      ->add_flag("-v,--verbose", archive->verbose,
+                 "with --check: every file, and every signal of those that are not the same")
+      ->needs(check);
   AddTrustOption(package, &arguments->trust);
   arguments->json.AddTo(package);
   SetFooter(package,
             {"package scenarios/stabilizing_platform/sea_state.yaml -o paper.zip",
-             "package four_bar/turn scara_robot/stiffness -o paper.zip --date 2026-11-23"},
-            "0 agree, 1 disagree (packed all the same), 2 bad input, 3 could not run, 4 internal "
-            "error");
-  package->callback([arguments, exit_code] { *exit_code = Package(*arguments); });
+             "package four_bar/turn scara_robot/stiffness -o paper.zip --date 2026-11-23",
+             "package --check paper.zip"},
+            "0 agree, or the same within limits; 1 disagree (packed all the same), or something "
+            "differs; 2 bad input, 3 could not run, 4 internal error");
+  package->callback([package, check, arguments, archive, exit_code] {
+    if (check->count() == 0 && arguments->scenarios.empty()) {
+      throw CLI::RequiredError("scenario, or --check");
+    }
+    archive->trust = arguments->trust;
+    archive->json = arguments->json;
+    *exit_code = check->count() > 0 ? CheckArchive(*archive) : Package(*arguments);
+  });
 }
 
 }  // namespace mbv

@@ -85,7 +85,7 @@ Json RootOf(const PackageDescription& package, const std::vector<PackedFile>& fi
                {"name", NameOf(package)},
                {"description",
                 "Models and scenarios of mechanisms, what computing them by independent witnesses "
-                "gave, and how to repeat it: mbverify verify compares."},
+                "gave, and how to repeat it: mbverify package --check compares."},
                {"datePublished", package.date}};
   if (package.license.starts_with("http")) {
     root["license"] = Id(package.license);
@@ -158,7 +158,8 @@ std::string CrateJson(const PackageDescription& package) {
 std::string PackageReadme(const PackageDescription& package) {
   std::string text = "# " + MarkdownText(NameOf(package)) + "\n\n";
   text += fmt::format(
-      "Written by mbverify {}. `mbverify verify` with the archive runs everything again and "
+      "Written by mbverify {}. `mbverify package --check` with the archive runs everything again "
+      "and "
       "compares;"
       " in this folder a single result is repeated by its command.\n\n",
       MarkdownText(VersionOf(package, "mbverify")));

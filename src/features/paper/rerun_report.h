@@ -1,4 +1,4 @@
-// What repeating the results of an archive gave (`mbverify verify`), and its writers.
+// What repeating the results of an archive gave (`mbverify package --check`), and its writers.
 #pragma once
 
 #include <string>

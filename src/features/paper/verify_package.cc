@@ -1,4 +1,5 @@
-// `mbverify verify`: repeats the results of an archive (features/paper/package.h) on this machine.
+// `mbverify package --check`: repeats the results of an archive (features/paper/package.h) on this
+// machine.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -28,6 +29,7 @@
 #include "features/paper/package.h"
 #include "features/paper/packed_run.h"
 #include "features/paper/rerun_report.h"
+#include "scenario/load_scenario.h"
 #include "verify/run_witnesses.h"
 #include "verify/version.h"
 
@@ -327,17 +329,9 @@ VerifyOutcome VerifyPackage(const std::string& file, const VerifyOptions& option
   return PackageVerifier(file, options).Verify();
 }
 
-// mbverify verify
+// mbverify package --check
 
-namespace {
-
-struct VerifyArguments {
-  std::string archive;
-  bool trust = false, verbose = false;
-  JsonOption json;
-};
-
-int Verify(const VerifyArguments& arguments) {
+int CheckArchive(const ArchiveArguments& arguments) {
   VerifyOptions options{.trust = arguments.trust};
   VerifyOutcome outcome;
   {
@@ -367,21 +361,28 @@ int Verify(const VerifyArguments& arguments) {
   return WorseExit(outcome.exit_code, arguments.json.Write(json, {{arguments.archive, ""}}));
 }
 
+namespace {
+
+// A scenario is what many expect to give a program of this name.
+int VerifyWord(const ArchiveArguments& arguments) {
+  const ScenarioHead head = ReadScenarioHead(arguments.archive);
+  const char* command = head.is_scenario ? "run" : head.HasKey("study") ? "study" : nullptr;
+  if (command == nullptr) return CheckArchive(arguments);
+  return Refuse(fmt::format("{} is not an archive", arguments.archive),
+                fmt::format("mbverify {} {}", command, arguments.archive));
+}
+
 }  // namespace
 
+// The former name of package --check; help does not show it.
 void AddVerifyCommand(CLI::App* app, int* exit_code) {
-  auto arguments = std::make_shared<VerifyArguments>();
-  CLI::App* verify = app->add_subcommand(
-      "verify", "Repeat what an archive of package holds, and say which results are the same");
+  auto arguments = std::make_shared<ArchiveArguments>();
+  CLI::App* verify = app->add_subcommand("verify", "package --check");
   verify->add_option("archive", arguments->archive, "the archive")->required();
   AddTrustOption(verify, &arguments->trust);
-  verify->add_flag("-v,--verbose", arguments->verbose,
-                   "every file, and every signal of those that are not the same");
+  verify->add_flag("-v,--verbose", arguments->verbose, "as of package");
   arguments->json.AddTo(verify);
-  SetFooter(verify, {"verify paper.zip", "verify paper.zip --json -"},
-            "0 the same or within limits, 1 something differs, 2 bad input, 3 could not run, 4 "
-            "internal error");
-  verify->callback([arguments, exit_code] { *exit_code = Verify(*arguments); });
+  verify->callback([arguments, exit_code] { *exit_code = VerifyWord(*arguments); });
 }
 
 }  // namespace mbv

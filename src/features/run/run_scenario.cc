@@ -299,7 +299,10 @@ class ScenarioRun {
     report_.mechanism = base().name;
     report_.model_file = scenario().model_file;
     report_.description = scenario().description;
-    for (const Drive& drive : base().drives) report_.drives.push_back(drive.name);
+    for (const Drive& drive : base().drives) {
+      report_.drives.push_back(drive.name);
+      report_.symbols.push_back(drive.symbol);
+    }
     report_.mode = ModeText(simulation);
     report_.engine = simulation.stock_engine ? "stock" : "corrected";
     report_.step_s = simulation.step_s;

@@ -335,9 +335,9 @@ std::vector<StudyBand> StudyBands(const StudyBench& bench, const std::filesystem
                    .unit = forces.units[d],
                    .time_s = forces.time_s,
                    .nominal = {},
-                   .p5 = {},
-                   .p50 = {},
-                   .p95 = {}};
+                   .lower = {},
+                   .median = {},
+                   .upper = {}};
     size_t left_out = 0;
     const auto records = DriveRecords(forces, d, file, &left_out);
     band.points = records.size();
@@ -348,9 +348,10 @@ std::vector<StudyBand> StudyBands(const StudyBench& bench, const std::filesystem
       for (const auto& record : records) values.push_back(static_cast<double>(record[t]));
       std::sort(values.begin(), values.end());
       band.nominal.push_back(static_cast<double>(bench.nominal().forces[d * times + t]));
-      band.p5.push_back(Percentile(values, 0.05));
-      band.p50.push_back(Percentile(values, 0.50));
-      band.p95.push_back(Percentile(values, 0.95));
+      const double share = band.percentiles() ? 0.05 : 0.0;
+      band.lower.push_back(Percentile(values, share));
+      band.median.push_back(Percentile(values, 0.50));
+      band.upper.push_back(Percentile(values, 1.0 - share));
     }
     if (band.points > 0) bands.push_back(std::move(band));
   }

@@ -8,6 +8,7 @@
 
 #include "base/names.h"
 #include "features/study/study_report.h"
+#include "plot/style.h"
 #include "plot/svg.h"
 #include "plot/svg_plot.h"
 #include "report/page.h"
@@ -86,17 +87,29 @@ class PlotList {
     for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
       const SobolIndex& index = q.sobol->indices[k];
       if (!std::isfinite(index.total)) continue;
-      bars.rows.push_back({report_.study.factors[k].name, {index.first, index.total}});
+      const auto interval = [](const Interval& i) { return std::array{i.lower, i.upper}; };
+      bars.rows.push_back({report_.study.factors[k].name,
+                           {std::max(0.0, index.first), index.total},
+                           {interval(index.first_interval), interval(index.total_interval)}});
     }
     if (!bars.rows.empty()) Add(StudySection::kIndices, "indices_" + q.name, ToSvg(bars));
   }
 
   void AddBand(const StudyBand& band) {
-    LinePlot plot = ForcePlot(band.drive, band.unit);
-    AddLine("nominal", band.time_s, band.nominal, &plot);
-    AddLine("5 %", band.time_s, band.p5, &plot);
-    AddLine("median", band.time_s, band.p50, &plot);
-    AddLine("95 %", band.time_s, band.p95, &plot);
+    double largest = 0.0;
+    for (const double v : band.upper) largest = std::max(largest, std::abs(v));
+    for (const double v : band.lower) largest = std::max(largest, std::abs(v));
+    const ShownUnit unit = UsualUnit(band.unit, largest);
+    const auto shown = [&](std::vector<double> values) {
+      for (double& v : values) v *= unit.factor;
+      return values;
+    };
+    LinePlot plot = ForcePlot(band.drive, unit.name);
+    plot.areas.push_back({band.percentiles() ? "5 % … 95 %" : "least … most", band.time_s,
+                          shown(band.lower), shown(band.upper)});
+    AddLine("nominal", band.time_s, shown(band.nominal), &plot);
+    AddLine("median", band.time_s, shown(band.median), &plot);
+    plot.lines.back().dashed = true;
     Add(StudySection::kBands, "band_" + band.drive, std::move(plot));
   }
 
@@ -104,16 +117,18 @@ class PlotList {
   void AddValidation(const DriveValidation& drive) {
     const ForceComparison& f = drive.forces;
     LinePlot plot = ForcePlot(f.drive + ": computed − measured", f.unit);
-    std::vector<double> error, upper, lower;
+    PlotArea band{.label = fmt::format("± {:g} u_val", report_.study.validation->coverage),
+                  .x = f.time_s,
+                  .lower = {},
+                  .upper = {}};
+    std::vector<double> error;
     for (size_t t = 0; t < f.time_s.size(); ++t) {
       error.push_back(f.computed[t] - f.measured[t]);
-      upper.push_back(report_.study.validation->coverage * drive.u_val[t]);
-      lower.push_back(-upper.back());
+      band.upper.push_back(report_.study.validation->coverage * drive.u_val[t]);
+      band.lower.push_back(-band.upper.back());
     }
-    const std::string word = fmt::format("{:g} u_val", report_.study.validation->coverage);
+    plot.areas.push_back(std::move(band));
     AddLine("E", f.time_s, error, &plot);
-    AddLine("+" + word, f.time_s, upper, &plot);
-    AddLine("−" + word, f.time_s, lower, &plot);
     Add(StudySection::kValidation, "validation_" + f.drive, std::move(plot));
   }
 

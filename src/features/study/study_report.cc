@@ -97,6 +97,61 @@ ReportSection Limits(const StudyReport& report) {
   return section;
 }
 
+// "normal" and "σ = 0.5 %", with the nominal value as the measure of what differs from it.
+std::pair<std::string, std::string> DistributionTexts(const Axis& axis) {
+  const double nominal = std::abs(axis.nominal);
+  const auto percent = [&](double spread) {
+    return nominal > 0.0 ? fmt::format(" ({:.3g} %)", 100.0 * spread / nominal) : "";
+  };
+  if (const auto* normal = std::get_if<Normal>(&axis.distribution)) {
+    std::string text = fmt::format("σ = {:.4g}{}", normal->sigma, percent(normal->sigma));
+    if (normal->mean != axis.nominal) text = fmt::format("mean {:.6g}, ", normal->mean) + text;
+    return {"normal", text};
+  }
+  if (const auto* uniform = std::get_if<Uniform>(&axis.distribution)) {
+    const double half = 0.5 * (uniform->upper - uniform->lower);
+    return {"uniform", fmt::format("{:.6g} … {:.6g}{}", uniform->lower, uniform->upper,
+                                   nominal > 0.0 ? " (±" + percent(half).substr(2) : "")};
+  }
+  constexpr size_t kMost = 6;
+  std::vector<std::string> levels;
+  for (const double value : std::get<Levels>(axis.distribution).values) {
+    if (levels.size() == kMost) {
+      levels.emplace_back("…");
+      break;
+    }
+    levels.push_back(fmt::format("{:.6g}", value));
+  }
+  return {"levels", Joined(levels)};
+}
+
+// What was varied, and how much: the rest of the page is about that.
+ReportSection Varied(const StudyReport& report) {
+  const Study& study = report.study;
+  ReportSection section{.title = "What is varied", .link = "Varied"};
+  Table table{.caption = fmt::format("{} numbers of {}", study.factors.size(), study.scenario),
+              .columns = {Text("number"), Digits("nominal"), Text("distribution"), Text("spread"),
+                          Text("effect")}};
+  for (const Factor& factor : study.factors) {
+    const auto [kind, spread] = study.design.kind == DesignKind::kList
+                                    ? std::pair<std::string, std::string>{"as listed", ""}
+                                    : DistributionTexts(factor.axis);
+    table.rows.push_back({factor.name, Six(factor.axis.nominal), kind, spread});
+    if (report.idle.empty()) continue;
+    table.rows.back().push_back(
+        Contains(report.idle, factor.name) ? Cell("moves no quantity", Mark::kWarn) : Cell(""));
+  }
+  if (report.idle.empty()) table.columns.pop_back();
+  section.Add(std::move(table), On::kPage);
+  for (const Correlation& c : study.design.correlations) {
+    section.Add(Paragraph{fmt::format("{} and {} go together: correlation {:g}",
+                                      study.factors[c.first].name, study.factors[c.second].name,
+                                      c.coefficient)},
+                On::kPage);
+  }
+  return section;
+}
+
 ReportSection Quantities(const StudyReport& report) {
   ReportSection section{.title = "Quantities", .link = "Quantities"};
   Table table{
@@ -110,6 +165,35 @@ ReportSection Quantities(const StudyReport& report) {
   }
   section.Add(std::move(table));
   return section;
+}
+
+// What the estimates cannot tell: intervals that are wide, and a part that is larger than the
+// whole.
+std::string ResolutionText(const StudyReport& report, const QuantitySummary& q) {
+  constexpr double kCoarse = 0.2;  // of the variance: a main effect and none look alike
+  double widest = 0.0;
+  std::vector<std::string> larger;
+  for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
+    const SobolIndex& index = q.sobol->indices[k];
+    for (const Interval& i : {index.first_interval, index.total_interval}) {
+      if (std::isfinite(i.upper)) widest = std::max(widest, i.upper - i.lower);
+    }
+    if (index.first > index.total) larger.push_back(report.study.factors[k].name);
+  }
+  std::string text;
+  if (widest > kCoarse) {
+    text = fmt::format(
+        "{} blocks do not resolve the indices of {}: an interval is {:.2f} wide. Four times as "
+        "many blocks make it half as wide.",
+        q.sobol->blocks, q.name, widest);
+  }
+  if (!larger.empty()) {
+    text += fmt::format(
+        "{}First order above total ({}) is an error of the estimates: alone a number makes at most "
+        "what it makes in all.",
+        text.empty() ? "" : " ", Joined(larger));
+  }
+  return text;
 }
 
 ReportSection Indices(const StudyReport& report, const std::vector<StudyPlot>& plots) {
@@ -131,6 +215,8 @@ ReportSection Indices(const StudyReport& report, const std::vector<StudyPlot>& p
                             interval(index.total_interval)});
     }
     section.Add(std::move(table));
+    const std::string resolution = ResolutionText(report, q);
+    if (!resolution.empty()) section.Add(Paragraph{resolution});
   }
   if (section.blocks.empty()) return section;
   section.Note(
@@ -196,8 +282,13 @@ ReportSection Bands(const StudyReport& report, const std::vector<StudyPlot>& plo
   ReportSection section{.title = "Drive forces over time", .link = "Bands"};
   AddPlots(plots, StudySection::kBands, &section);
   if (section.blocks.empty()) return section;
-  section.Note(fmt::format("Percentiles at each time of {} points ({} left out).",
-                           report.bands[0].points, report.bands[0].left_out));
+  section.Note(
+      fmt::format("{} at each time of {} points ({} left out){}.",
+                  report.bands[0].percentiles() ? "Percentiles" : "Least and most",
+                  report.bands[0].points, report.bands[0].left_out,
+                  report.bands[0].percentiles()
+                      ? ""
+                      : fmt::format("; percentiles from {} points on", kFewestForPercentiles)));
   return section;
 }
 
@@ -287,7 +378,8 @@ std::string PointsText(const StudyReport& report) {
 
 std::vector<ReportSection> SectionsOf(const StudyReport& report,
                                       const std::vector<StudyPlot>& plots) {
-  return {Limits(report),
+  return {Varied(report),
+          Limits(report),
           Quantities(report),
           Indices(report, plots),
           OneAtATime(report, plots),
@@ -401,9 +493,9 @@ Json BandJson(const StudyBand& band) {
           {"left_out", band.left_out},
           {"time_s", NumberList(band.time_s)},
           {"nominal", NumberList(band.nominal)},
-          {"p5", NumberList(band.p5)},
-          {"p50", NumberList(band.p50)},
-          {"p95", NumberList(band.p95)}};
+          {band.percentiles() ? "p5" : "least", NumberList(band.lower)},
+          {"p50", NumberList(band.median)},
+          {band.percentiles() ? "p95" : "most", NumberList(band.upper)}};
 }
 
 Json ValidationJson(const StudyReport& report) {

@@ -12,11 +12,14 @@
 
 namespace mbv {
 
-/// A drive's force over time: percentiles of all points, beside the nominal curve.
+/// A drive's force over time: what most points stay between, beside the nominal curve.
 struct StudyBand {
   std::string drive, unit;
-  std::vector<double> time_s, nominal, p5, p50, p95;
+  std::vector<double> time_s, nominal, lower, median, upper;
   std::uint64_t points = 0, left_out = 0;  ///< with forces at the nominal times, and without
+
+  /// From the 5th to the 95th percentile; of few points from the least to the most.
+  [[nodiscard]] bool percentiles() const { return points >= kFewestForPercentiles; }
 };
 
 struct StudyReport {

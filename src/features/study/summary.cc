@@ -46,9 +46,11 @@ void AddMoments(const std::vector<double>& sorted, QuantitySummary* summary) {
   if (sorted.size() > 1) summary->deviation = std::sqrt(squares / (count - 1.0));
   summary->least = sorted.front();
   summary->most = sorted.back();
-  summary->p5 = Percentile(sorted, 0.05);
   summary->p50 = Percentile(sorted, 0.50);
-  summary->p95 = Percentile(sorted, 0.95);
+  if (sorted.size() >= kFewestForPercentiles) {
+    summary->p5 = Percentile(sorted, 0.05);
+    summary->p95 = Percentile(sorted, 0.95);
+  }
   summary->histogram = HistogramOf(sorted);
 }
 

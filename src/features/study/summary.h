@@ -33,13 +33,17 @@ struct QuantitySummary {
   std::uint64_t count = 0, missing = 0;  ///< points with and without a value
   double mean = kNan, deviation = kNan;  ///< standard deviation, of a sample
   double least = kNan, most = kNan;
-  double p5 = kNan, p50 = kNan, p95 = kNan;  ///< percentiles of all points
+  double p50 = kNan;
+  /// Percentiles of all points; NaN of fewer than kFewestForPercentiles.
+  double p5 = kNan, p95 = kNan;
   Histogram histogram;
   std::vector<WorstPoint> worst;     ///< at most kWorstPoints, the worst one first
   std::optional<SobolResult> sobol;  ///< of Saltelli's design
   std::vector<Swing> swings;         ///< of one at a time, the widest first
 };
 inline constexpr size_t kWorstPoints = 3;
+/// Of fewer values one in twenty is none: 5 % and 95 % would be the least and the most.
+inline constexpr size_t kFewestForPercentiles = 20;
 
 struct LimitResult {
   StudyLimit limit;

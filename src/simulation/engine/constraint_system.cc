@@ -161,7 +161,7 @@ void ConstraintSystem::EvaluatePosition() {
   mjModel* m = engine_.m.get();
   mj_kinematics(m, d_);
   mj_comPos(m, d_);
-  if (J_.rows() != rows_) FindPattern();
+  if (J_.rows() != rows_ || J_.cols() != m->nv) FindPattern();  // also where there are no rows
   {
     const OwnJacobians jacobians(engine_);
     mj_tendon(m, d_);

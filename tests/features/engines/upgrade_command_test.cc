@@ -1,4 +1,4 @@
-// mbverify upgrade as a user types it, with the newest MuJoCo for real.
+// mbverify crosscheck --newest as a user types it, with the newest MuJoCo for real.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -14,7 +14,7 @@ const std::string kUpgraded = SourcePath("/scenarios/four_bar/turn_inverse.yaml"
 TEST(UpgradeCommand, ExplainsWhatTheNewestVersionChanges) {
   const Program mbverify("upgrade");
   const std::string file = (mbverify.folder() / "u.json").string();
-  const ProgramResult result = mbverify("upgrade " + kUpgraded + " --json " + file);
+  const ProgramResult result = mbverify("crosscheck --newest " + kUpgraded + " --json " + file);
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_EQ(result.out.find("not explained"), std::string::npos) << result.out;
   const auto json = nlohmann::json::parse(ReadAll(file));
@@ -42,7 +42,7 @@ TEST(UpgradeCommand, SaysThatTheOtherVersionIsNotThere) {
       mbverify.Script("MBV_MUJOCO_PACKAGE=/nowhere \"$mbverify\" upgrade " + kUpgraded);
   EXPECT_EQ(absent.exit_code, 3);
   EXPECT_NE(absent.out.find("is not installed in /nowhere"), std::string::npos) << absent.out;
-  const ProgramResult dies = mbverify("upgrade " + kUpgraded + " --program false");
+  const ProgramResult dies = mbverify("crosscheck --newest " + kUpgraded + " --program false");
   EXPECT_EQ(dies.exit_code, 3);
   EXPECT_NE(dies.out.find("ended with exit code 1"), std::string::npos) << dies.out;
 }
@@ -50,11 +50,11 @@ TEST(UpgradeCommand, SaysThatTheOtherVersionIsNotThere) {
 TEST(UpgradeCommand, RefusesFreeMotionsAndItsOwnInputs) {
   const Program mbverify("upgrade_bad");
   const ProgramResult free =
-      mbverify("upgrade " + SourcePath("/scenarios/floating_loop/tumble.yaml"));
+      mbverify("crosscheck --newest " + SourcePath("/scenarios/floating_loop/tumble.yaml"));
   EXPECT_EQ(free.exit_code, 3);
   EXPECT_NE(free.err.find("follows from forces"), std::string::npos) << free.err;
-  EXPECT_EQ(mbverify("upgrade " + kUpgraded + " --json " + kUpgraded).exit_code, 2);
-  EXPECT_EQ(mbverify("upgrade " + kUpgraded + " --set nonsense").exit_code, 2);
+  EXPECT_EQ(mbverify("crosscheck --newest " + kUpgraded + " --json " + kUpgraded).exit_code, 2);
+  EXPECT_EQ(mbverify("crosscheck --newest " + kUpgraded + " --set nonsense").exit_code, 2);
 }
 
 }  // namespace

@@ -46,6 +46,20 @@ TEST(DefaultFigures, LinesHaveEverySampleOfTheTrace) {
   }
 }
 
+TEST(DefaultFigures, DrivesWithASymbolAreCalledByIt) {
+  Report report = test::SampledReport();
+  report.symbols = {"_{1}′", ""};
+  const FigureSet set = DefaultFigures(report, Language::kEnglish);
+  const auto label = [&](const char* figure) {
+    return Named(set, figure).panels[0].curves[0].label;
+  };
+  EXPECT_EQ(label("drive_forces"), "*F*_{1}′");
+  EXPECT_EQ(label("drive_strokes"), "*q*_{1}′");
+  EXPECT_EQ(label("power_energy"), "*P*_{1}′");
+  EXPECT_EQ(label("force_speed"), "*F*_{1}′");
+  EXPECT_EQ(Named(set, "force_speed").panels[0].curves[1].label, "d2");
+}
+
 TEST(DefaultFigures, OneBentSampleShowsInTheDifferences) {
   synthetic::Case c;
   c.simulated.values(40, c.simulated.Find("d2.force")) += 0.25;

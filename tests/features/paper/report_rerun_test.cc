@@ -185,8 +185,8 @@ TEST(Manifest, WhatIsMissingOrLeadsOutsideIsFound) {
   };
   EXPECT_TRUE(
       Says(found("mbverify.package/1", "mbverify.package/2"), "schema is 'mbverify.package/2'"));
-  EXPECT_TRUE(Says(found("results/m/a/traces", "../m/a/traces"), "no path in an archive"));
-  EXPECT_TRUE(Says(found("\"inputs/packages", "\"/packages"), "no path in an archive"));
+  EXPECT_TRUE(Says(found("results/m/a/traces", "../m/a/traces"), "not a path in an archive"));
+  EXPECT_TRUE(Says(found("\"inputs/packages", "\"/packages"), "not a path in an archive"));
   EXPECT_TRUE(Says(found("\"exit_code\": 0", "\"exit_code\": \"0\""), "without exit_code"));
   EXPECT_TRUE(Says(found("\"motion\"", "\"emotion\""), "of the kind 'emotion'"));
   EXPECT_TRUE(Says(found("\"files\"", "\"fils\""), "has no list 'files'"));

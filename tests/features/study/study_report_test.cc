@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+
+#include "features/study/study_html.h"
 
 namespace mbv {
 namespace {
@@ -27,9 +30,9 @@ StudyReport TwoPoints(double share) {
                    .unit = "N",
                    .time_s = {0.0, 1.0},
                    .nominal = {10, 10},
-                   .p5 = {11, 11},
-                   .p50 = {15, 15},
-                   .p95 = {19, 19},
+                   .lower = {11, 11},
+                   .median = {15, 15},
+                   .upper = {19, 19},
                    .points = 2}};
   report.versions = {{"mbverify", "1"}};
   return report;
@@ -49,18 +52,80 @@ TEST(StudyReport, AVerdictIsToldTheSameEverywhere) {
   EXPECT_TRUE(nlohmann::json::parse(ToJson(kept))["limits"][0]["pass"].get<bool>());
 }
 
+// Five bins from 11 to 19; the two points lie in the first and in the last.
+TEST(StudyReport, AHistogramsBinsReachFromTheLeastToTheMost) {
+  const std::vector<StudyPlot> plots = StudyPlots(TwoPoints(0.0));
+  const auto histogram = std::ranges::find(plots, StudySection::kHistograms, &StudyPlot::section);
+  ASSERT_NE(histogram, plots.end());
+  ASSERT_TRUE(histogram->lines);
+  const auto& outline = histogram->lines->lines.at(0).points;
+  ASSERT_EQ(outline.size(), 2u + 2u * 5u);
+  for (size_t k = 0; k < 5; ++k) {
+    const double left = 11.0 + 1.6 * static_cast<double>(k);
+    const double count = k == 0 || k == 4 ? 1.0 : 0.0;
+    EXPECT_NEAR(outline[1 + 2 * k].first, left, 1e-12) << k;
+    EXPECT_NEAR(outline[2 + 2 * k].first, left + 1.6, 1e-12) << k;
+    EXPECT_EQ(outline[1 + 2 * k].second, count) << k;
+    EXPECT_EQ(outline[2 + 2 * k].second, count) << k;
+  }
+}
+
 TEST(StudyReport, HasNumbersCommandsAndBands) {
   const StudyReport report = TwoPoints(0.0);
   const auto json = nlohmann::json::parse(ToJson(report));
   EXPECT_EQ(json["schema"], "mbverify.study_summary/1");
   EXPECT_EQ(json["quantities"][0]["most"], 19.0);
   EXPECT_EQ(json["quantities"][0]["worst"][0]["varied"]["m<p>"], 1.9);
-  EXPECT_EQ(json["force_bands"][0]["p95"][1], 19.0);
+  EXPECT_EQ(json["force_bands"][0]["most"][1], 19.0);
+  EXPECT_FALSE(json["force_bands"][0].contains("p95")) << "of two points";
   EXPECT_NE(ToText(report).find("mbverify run s.yaml --set 'a=<1>'"), std::string::npos);
   const std::string page = ToHtml(report);
   EXPECT_NE(page.find("--set &#39;a=&lt;1&gt;&#39;"), std::string::npos) << page.substr(0, 200);
   EXPECT_EQ(page.find("m<p>"), std::string::npos);
   EXPECT_NE(page.find("drive force [N]"), std::string::npos);
+}
+
+TEST(StudyReport, SaysFirstWhatIsVariedAndHowMuch) {
+  StudyReport report = TwoPoints(0.0);
+  report.study.factors.push_back(
+      {.name = "length", .key = "parameters.length", .axis = {2.0, Uniform{1.9, 2.1}}});
+  report.study.factors.push_back(
+      {.name = "screw", .key = "parameters.screw", .axis = {0.0, Levels{{1.0, 2.5}}}});
+  report.idle = {"screw"};
+  const std::string page = ToHtml(report);
+  for (const char* text : {"σ = 0.1 (10 %)", "1.9 … 2.1 (±5 %)", "1, 2.5", "moves no quantity"}) {
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+  }
+  EXPECT_LT(page.find("σ = 0.1"), page.find("x.force.max &lt; 15"));
+}
+
+TEST(StudyReport, WideIntervalsAndPartsLargerThanTheWholeAreNamed) {
+  StudyReport report = TwoPoints(0.0);
+  SobolResult sobol{.indices = {{0.4, 0.5, {0.35, 0.45}, {0.42, 0.58}}},
+                    .mean = 1,
+                    .variance = 1,
+                    .blocks = 64,
+                    .left_out = 0};
+  report.summary.quantities[0].sobol = sobol;
+  EXPECT_EQ(ToText(report).find("do not resolve"), std::string::npos);
+  EXPECT_EQ(ToText(report).find("above total"), std::string::npos);
+  sobol.indices[0].first_interval = {0.2, 0.45};
+  report.summary.quantities[0].sobol = sobol;
+  EXPECT_NE(ToText(report).find("64 blocks do not resolve the indices of x.force.max: an interval "
+                                "is 0.25 wide"),
+            std::string::npos)
+      << ToText(report);
+  sobol.indices[0].first = 0.51;
+  report.summary.quantities[0].sobol = sobol;
+  EXPECT_NE(ToText(report).find("First order above total (m<p>)"), std::string::npos);
+}
+
+TEST(StudyReport, LargeForcesAreShownInKilonewtons) {
+  StudyReport report = TwoPoints(0.0);
+  for (auto* values : {&report.bands[0].nominal, &report.bands[0].lower, &report.bands[0].upper}) {
+    for (double& value : *values) value *= 1e4;
+  }
+  EXPECT_NE(ToHtml(report).find("drive force [kN]"), std::string::npos);
 }
 
 TEST(StudyReport, WithoutLimitsOrResultsSaysSo) {

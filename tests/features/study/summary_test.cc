@@ -73,6 +73,10 @@ TEST(StudySummary, PercentilesAndMomentsAreThoseOfTheNumbers) {
   EXPECT_EQ(q.p50, 51.0);
   EXPECT_EQ(q.p95, 96.0);
   EXPECT_EQ(q.mean, 51.0);
+  const auto few =
+      SummariseStudy(OneQuantity(DesignKind::kList), {50.0}, Counting(19)).quantities[0];
+  EXPECT_TRUE(std::isnan(few.p5) && std::isnan(few.p95)) << "of 19 values none is one in twenty";
+  EXPECT_EQ(few.p50, 10.0);
   EXPECT_NEAR(q.deviation, std::sqrt(101.0 * 102.0 / 12.0), 1e-12);
 }
 

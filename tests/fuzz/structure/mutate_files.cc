@@ -342,7 +342,7 @@ class Maker {
       bytes = WriteZip(std::move(entries), &trouble).value_or(bytes);
     }
     WriteText(file, bytes);
-    input->argv = {"verify", file.string()};
+    input->argv = {"package", "--check", file.string()};
   }
 
   // A cube in the formats that meshes have, on a body.
