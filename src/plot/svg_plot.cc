@@ -428,15 +428,24 @@ std::vector<ContourPiece> Contour(const std::vector<double>& values, int columns
 
 namespace {
 
-constexpr double kBarRow = 20, kBarName = 190, kBarColumn = 230, kBarTop = 24;
+constexpr double kBarRow = 20, kBarColumn = 230, kBarTop = 24;
+constexpr double kLeastName = 190, kMostName = 300;  // room for the rows' names
+constexpr double kLetter = 6.6;                      // of a usual letter
 constexpr double kBarNumber = 70;  // of a column, for the number behind the longest bar
 constexpr std::array<const char*, 2> kBarColors = {"#0072b2", "#d55e00"};
 
-std::string BarLine(const BarRow& row, double top, double scale) {
-  std::string svg =
-      SvgText({{"x", kBarName - 8}, {"y", top + 13}, {"text-anchor", "end"}}, row.name) + "\n";
+// The end of a name that has no room says more than its beginning.
+std::string FittedName(const std::string& name, double room) {
+  const auto most = static_cast<size_t>(room / kLetter);
+  return name.size() <= most ? name : "…" + name.substr(name.size() - most + 1);
+}
+
+std::string BarLine(const BarRow& row, double top, double scale, double names) {
+  std::string svg = SvgText({{"x", names - 8}, {"y", top + 13}, {"text-anchor", "end"}},
+                            FittedName(row.name, names - 8)) +
+                    "\n";
   for (size_t c = 0; c < row.shares.size(); ++c) {
-    const double left = kBarName + kBarColumn * static_cast<double>(c);
+    const double left = names + kBarColumn * static_cast<double>(c);
     const double width = std::max(0.5, scale * std::abs(row.shares[c]));
     svg += SvgShape("rect", {{"x", left},
                              {"y", top + 2},
@@ -471,18 +480,22 @@ std::string ToSvg(const BarPlot& plot) {
       if (std::isfinite(high)) most = std::max(most, high);
     }
   }
+  size_t longest = 0;
+  for (const BarRow& row : plot.rows) longest = std::max(longest, row.name.size());
+  const double names =
+      std::clamp(std::ceil(kLetter * static_cast<double>(longest)) + 8, kLeastName, kMostName);
   std::string svg = "\n";
   for (size_t c = 0; c < plot.columns.size(); ++c) {
-    svg += SvgText({{"x", kBarName + kBarColumn * static_cast<double>(c)}, {"y", "14"}},
-                   plot.columns[c]);
+    svg +=
+        SvgText({{"x", names + kBarColumn * static_cast<double>(c)}, {"y", "14"}}, plot.columns[c]);
   }
   svg += "\n";
   double top = kBarTop;
   for (size_t k = 0; k < std::min(plot.shown, plot.rows.size()); ++k) {
-    svg += BarLine(plot.rows[k], top, (kBarColumn - kBarNumber) / most);
+    svg += BarLine(plot.rows[k], top, (kBarColumn - kBarNumber) / most, names);
     top += kBarRow;
   }
-  const double width = kBarName + kBarColumn * static_cast<double>(plot.columns.size()) + 20;
+  const double width = names + kBarColumn * static_cast<double>(plot.columns.size()) + 20;
   const double height = top + 6;
   return SvgFigure(width, height, plot.title, svg);
 }

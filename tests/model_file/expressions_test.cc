@@ -110,6 +110,20 @@ TEST(Expressions, AVeryLongChainOfParametersIsRefused) {
   EXPECT_EQ(scope.Lookup("p4799").error, "is the end of a very long chain of parameters");
 }
 
+// Texts are kept parsed: what no parser takes is refused in the same words with other numbers.
+TEST(Expressions, WhatIsNoExpressionIsNoneWithOtherNumbersEither) {
+  for (const char* text : {"r*pi.3", "r*(2", "r + ;", "sin(r, 2)"}) {
+    std::vector<std::string> errors;
+    for (const char* value : {"1", "2", "3"}) {
+      Scope scope;
+      scope.Define("r", value);
+      errors.push_back(scope.Evaluate(text).error);
+    }
+    EXPECT_TRUE(errors[0].starts_with("is not an expression: ")) << text << ": " << errors[0];
+    EXPECT_EQ(errors, std::vector(3, errors[0])) << text;
+  }
+}
+
 TEST(Expressions, WhatIsRefusedIsToldWhy) {
   Scope scope;
   scope.Define("a", "1");

@@ -161,6 +161,16 @@ TEST(SvgPlot, AnAreaLiesBetweenItsCurvesAndItsRangeCounts) {
   EXPECT_NE(svg.find(">band</text>"), std::string::npos);
 }
 
+TEST(SvgPlot, LongNamesOfBarsHaveRoomOrLoseTheirBeginning) {
+  const auto with = [](size_t letters) {
+    return ToSvg(
+        BarPlot{.title = "n", .columns = {"c"}, .rows = {{std::string(letters, 'a'), {1.0}}}});
+  };
+  EXPECT_NE(with(30).find("<rect x=\"206\""), std::string::npos) << with(30);
+  EXPECT_NE(with(30).find(">" + std::string(30, 'a') + "<"), std::string::npos);
+  EXPECT_NE(with(60).find(">…" + std::string(43, 'a') + "<"), std::string::npos) << with(60);
+}
+
 TEST(SvgPlot, IntervalsOfBarsEndWhereTheirNumbersDo) {
   const BarPlot plot{.title = "i",
                      .columns = {"first"},

@@ -71,7 +71,8 @@ class PlotList {
   }
 
   void AddTornado(const QuantitySummary& q) {
-    BarPlot bars{.title = q.name, .columns = {"down, of nominal", "up, of nominal"}, .rows = {}};
+    BarPlot bars{
+        .title = q.name, .columns = {q.name + ", down, of nominal", "up, of nominal"}, .rows = {}};
     const double scale = std::abs(q.nominal);
     for (const Swing& swing : q.swings) {
       if (!(scale > 0.0) || !std::isfinite(swing.lowest)) continue;
@@ -83,7 +84,7 @@ class PlotList {
   }
 
   void AddIndices(const QuantitySummary& q) {
-    BarPlot bars{.title = q.name, .columns = {"first order", "total"}, .rows = {}};
+    BarPlot bars{.title = q.name, .columns = {q.name + ", first order", "total"}, .rows = {}};
     for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
       const SobolIndex& index = q.sobol->indices[k];
       if (!std::isfinite(index.total)) continue;

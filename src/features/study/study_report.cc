@@ -171,6 +171,7 @@ ReportSection Quantities(const StudyReport& report) {
 // whole.
 std::string ResolutionText(const StudyReport& report, const QuantitySummary& q) {
   constexpr double kCoarse = 0.2;  // of the variance: a main effect and none look alike
+  constexpr double kShown = 5e-4;  // the table's last decimal
   double widest = 0.0;
   std::vector<std::string> larger;
   for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
@@ -178,7 +179,7 @@ std::string ResolutionText(const StudyReport& report, const QuantitySummary& q) 
     for (const Interval& i : {index.first_interval, index.total_interval}) {
       if (std::isfinite(i.upper)) widest = std::max(widest, i.upper - i.lower);
     }
-    if (index.first > index.total) larger.push_back(report.study.factors[k].name);
+    if (index.first > index.total + kShown) larger.push_back(report.study.factors[k].name);
   }
   std::string text;
   if (widest > kCoarse) {

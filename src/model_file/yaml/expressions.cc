@@ -164,6 +164,7 @@ class Expression {
       int count = 0;
       const double* results = parser_->Eval(count);
       if (count == 1 && WhyNoNumber(results[0]).empty()) return results[0];
+    } catch (const mu::ParserError&) {  // no std::exception
     } catch (const std::exception&) {
     }
     return {};

@@ -18,6 +18,7 @@
 #include "base/worker_pool.h"
 #include "base/zip.h"
 #include "tests/fuzz/structure/mutations.h"
+#include "tests/support/sanitized.h"
 
 namespace mbv::fuzz {
 namespace {
@@ -382,7 +383,8 @@ std::string Broken(const WorkerEnd& end) {
 
 int Run(const Options& options) {
   constexpr size_t kBatch = 256;  // folders at a time
-  constexpr double kTimeout_s = 60.0;
+  // A program with sanitizers takes some twenty times as long, beside others still longer.
+  constexpr double kTimeout_s = test::kSanitized ? 600.0 : 60.0;
   fs::remove_all(fs::path(options.out) / "work");
   const Maker maker(options);
   if (!maker.trouble().empty()) {
