@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <charconv>
 
+#include "base/demand.h"
 #include "base/json_text.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
+#include "verify/version.h"
 
 namespace mbv {
 
@@ -35,6 +37,9 @@ bool ReadAssembly(const std::vector<std::string>& texts, std::map<std::string, i
 }
 
 void JsonOption::AddTo(CLI::App* command) {
+  const CLI::App* above = command->get_parent();
+  const bool nested = above != nullptr && above->get_parent() != nullptr;
+  command_ = (nested ? above->get_name() + "_" : "") + command->get_name();
   command->add_option("--json", path_,
                       "write the result to this file, too; -: to standard output, the text then to "
                       "standard error");
@@ -42,14 +47,21 @@ void JsonOption::AddTo(CLI::App* command) {
 
 int JsonOption::Write(const std::string& json, const std::vector<InputFile>& inputs) const {
   if (!wanted()) return 0;
-  if (path_ != "-") return WriteWholeFile(path_, json, inputs);
-  fmt::print("{}", json);
-  return 0;
+  return Write(ParseJson<nlohmann::ordered_json>(json), inputs);
 }
 
 int JsonOption::Write(const nlohmann::ordered_json& json,
                       const std::vector<InputFile>& inputs) const {
-  return wanted() ? Write(Dump(json), inputs) : 0;
+  if (!wanted()) return 0;
+  MBV_DEMAND(json.is_object(), command_);
+  nlohmann::ordered_json whole = {
+      {"schema", json.value("schema", fmt::format("mbverify.{}/1", command_))},
+      {"program", fmt::format("mbverify {}", kVersion)}};
+  whole.update(json);
+  const std::string text = Dump(whole);
+  if (path_ != "-") return WriteWholeFile(path_, text, inputs);
+  fmt::print("{}", text);
+  return 0;
 }
 
 nlohmann::ordered_json FindingObjects(const Diagnostics& diagnostics) {

@@ -23,6 +23,7 @@ void AddAssemblyOption(CLI::App* command, std::vector<std::string>* texts);
 
 class JsonOption {
  public:
+  /// What is written has `schema` ("mbverify.COMMAND/1", if it states none) and `program` in front.
   void AddTo(CLI::App* command);
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -36,7 +37,7 @@ class JsonOption {
                           const std::vector<InputFile>& inputs) const;
 
  private:
-  std::string path_;
+  std::string path_, command_;
 };
 
 /// For programs, unlike the sentences in summary.json: a list of objects with severity, file, line,

@@ -59,9 +59,39 @@ std::string Painted(const std::string& text, Paint paint, bool color) {
   return fmt::format("\x1b[{}m{}\x1b[0m", kCodes[static_cast<int>(paint)], text);
 }
 
+namespace {
+
+constexpr const char* kBetween = "  ";
+
+size_t WidthOf(const Table& table, size_t column) {
+  size_t width = PrintedWidth(OnOneLine(table.columns[column].title));
+  for (const auto& row : table.rows) {
+    width = std::max(width, PrintedWidth(OnOneLine(PlainText(CellOf(row, column)))));
+  }
+  return width;
+}
+
+// Without spare columns, from the right, as long as the rest is too wide.
+std::vector<size_t> FittingColumns(const Table& table, const TextStyle& style) {
+  std::vector<size_t> shown = ColumnsOf(table, On::kTerminal);
+  const auto total = [&] {
+    size_t width = style.indent.size();
+    for (const size_t k : shown) width += WidthOf(table, k) + (k == shown.front() ? 0 : 2);
+    return width;
+  };
+  while (style.columns > 0 && total() > style.columns) {
+    const auto spare = std::find_if(shown.rbegin(), shown.rend(),
+                                    [&](size_t k) { return table.columns[k].spare; });
+    if (spare == shown.rend()) break;
+    shown.erase(std::next(spare).base());
+  }
+  return shown;
+}
+
+}  // namespace
+
 std::vector<std::string> TextLines(const Table& table, const TextStyle& style) {
-  constexpr const char* kBetween = "  ";
-  const std::vector<size_t> shown = ColumnsOf(table, On::kTerminal);
+  const std::vector<size_t> shown = FittingColumns(table, style);
   std::vector<std::string> lines(1 + table.rows.size(), style.indent);
   for (size_t c = 0; c < shown.size(); ++c) {
     const Column& column = table.columns[shown[c]];

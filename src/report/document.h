@@ -43,7 +43,12 @@ struct Column {
   bool number = false;  ///< to the right
   bool wide = false;    ///< texts that LaTeX breaks into several lines
   On on = On::kAll;
+  bool spare = false;  ///< a terminal that is too narrow for all columns does without it
 };
+[[nodiscard]] inline Column Spare(Column column) {
+  column.spare = true;
+  return column;
+}
 [[nodiscard]] inline Column Text(std::string title, On on = On::kAll) {
   return {.title = std::move(title), .on = on};
 }
@@ -65,6 +70,7 @@ struct Table {
 struct TextStyle {
   std::string indent = "  ";
   bool color = false;
+  size_t columns = 0;  ///< of the terminal; 0: as many as are needed
 };
 
 /// The headings, then a line a row, without line ends: columns as wide as their widest cell.

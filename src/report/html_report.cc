@@ -33,9 +33,10 @@ ReportSection DriveSection(const Report& report) {
   bool floored = false;
   for (const PairComparison& pair : report.comparison.pairs) {
     if (!pair.compared || pair.drives.empty()) continue;
-    Table table{.caption = pair.measured + " against " + pair.truth,
-                .columns = {Text("drive"), Digits("RMS force"), Digits("RMS error / RMS force"),
-                            Digits("largest error"), Digits("at"), Digits("digits")}};
+    Table table{
+        .caption = pair.measured + " against " + pair.truth,
+        .columns = {Text("drive"), Spare(Digits("RMS force")), Digits("RMS error / RMS force"),
+                    Digits("largest error"), Digits("at"), Digits("digits")}};
     for (const DriveMetrics& drive : pair.drives) {
       floored = floored || (drive.floored && &pair == main);
       table.rows.push_back({drive.drive, fmt::format("{:.6g} {}", drive.rms_truth, drive.unit),

@@ -115,6 +115,7 @@ struct TableOptions {
   bool color = false;
   bool verbose = false;  ///< also how to read each signal, and what could not be compared
   bool sizing = false;   ///< all figures of the motors, not their margins only
+  size_t columns = 0;    ///< of the terminal; 0: no limit
 };
 /// A result of a kind that a product brings, as it is shown.
 class OtherResult {

@@ -64,8 +64,8 @@ std::string AboutText(const ShownCheck& check) {
 
 void TerminalText::Checks(const ResultView& view) {
   if (view.checks.empty()) return;
-  Table table{
-      .columns = {Text("check"), Digits("value"), Digits("limit"), Text(""), Text("worst at")}};
+  Table table{.columns = {Text("check"), Digits("value"), Spare(Digits("limit")), Text(""),
+                          Text("worst at")}};
   for (const ShownCheck& check : view.checks) {
     if (!Shown(check)) continue;
     table.rows.push_back({"  " + check.title, fmt::format("{:.2e}", check.value),

@@ -26,7 +26,7 @@ class TerminalText {
 
   void Line(const std::string& text = "") { text_ += text + "\n"; }
 
-  /// "title: VERDICT"; below it the description, `about`, reason, reservations, attribution and
+  /// "title: VERDICT"; below it the description, `about`, reason, caveats, attribution and
   /// findings.
   void Head(const ResultView& view, const std::string& title,
             const std::vector<std::string>& about);
@@ -42,7 +42,9 @@ class TerminalText {
              const std::string& more = "");
 
  private:
-  [[nodiscard]] TextStyle Style() const { return {.color = options_.color}; }
+  [[nodiscard]] TextStyle Style() const {
+    return {.color = options_.color, .columns = options_.columns};
+  }
   [[nodiscard]] bool Shown(const ShownCheck& check) const;
 
   const TableOptions options_;

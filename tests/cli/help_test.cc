@@ -1,6 +1,7 @@
 // Help, hints and terminals, for every subcommand that the program has.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
 
@@ -284,6 +285,48 @@ TEST_F(HelpTest, TablesFitTheTerminal) {
       }
     }
   }
+}
+
+TEST_F(HelpTest, JsonOfEachCommandNamesItsSchemaAndTheProgram) {
+  const std::string out = " --out " + mbverify.Out() + "/x";
+  const std::vector<std::pair<std::string, std::string>> calls = {
+      {"run four_bar/turn_inverse --no-pictures --no-report" + out, "run/1"},
+      {"audit spr_tripod", "audit/1"},
+      {"figures four_bar/turn --only drive_torques" + out, "figures/1"},
+      {"tables four_bar/turn" + out, "tables/1"},
+      {"size machine_five_bar/draw", "sizing/1"},
+      {"survey models/four_bar", "survey/1"},
+      {"model four_bar", "model/1"},
+      {"converge four_bar/turn", "convergence/1"},
+      {"sensitivity four_bar/turn_inverse --parameter rho --no-search", "mutate/2"}};
+  for (const auto& [call, schema] : calls) {
+    const ProgramResult result = mbverify(call + " --json -");
+    const auto json = nlohmann::json::parse(result.out, nullptr, false);
+    ASSERT_TRUE(json.is_object()) << call << "\n" << result.out.substr(0, 300) << result.err;
+    EXPECT_EQ(json["schema"], "mbverify." + schema) << call;
+    EXPECT_EQ(json["program"].get<std::string>().substr(0, 9), "mbverify ") << call;
+    EXPECT_TRUE(result.out.starts_with("{\n  \"schema\"")) << result.out.substr(0, 60);
+  }
+}
+
+// A row of 80 columns is whole, without what can be spared.
+TEST_F(HelpTest, VerdictRowsFitEightyColumns) {
+  const std::string call =
+      "run stabilizing_platform/must_fail/analytic_mass --no-pictures --no-report --out " +
+      mbverify.Out();
+  size_t failed = 0, drives = 0;
+  for (const std::string& line : LinesOf(OnTerminal(80, "NO_COLOR=1", call))) {
+    if (line.find("/out/") != std::string::npos) continue;  // a path cannot be broken
+    EXPECT_LE(PrintedWidth(line), 80u) << line;
+    if (line.find("  FAIL  ") != std::string::npos) {
+      ++failed;
+      EXPECT_TRUE(line.ends_with(" s")) << "the row is broken: " << line;
+    }
+    drives += line.find("limb2.drive_p  ") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GE(failed, 6u);
+  EXPECT_EQ(drives, 1u);
+  EXPECT_NE(OnTerminal(100, "NO_COLOR=1", call).find("1.0e-10  FAIL"), std::string::npos);
 }
 
 TEST_F(HelpTest, ColumnsOverridesTheTerminal) {

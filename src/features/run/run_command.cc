@@ -91,7 +91,8 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
   if (const std::optional<ResultView> view = outcome.View()) {
     const TableOptions table{.color = WantsColor(arguments.json.text()),
                              .verbose = arguments.verbose,
-                             .sizing = arguments.sizing};
+                             .sizing = arguments.sizing,
+                             .columns = TerminalColumns(arguments.json.text())};
     SayText(arguments.json.text(), arguments.quiet  ? VerdictLine(*view, table)
                                    : outcome.report ? ToTable(*outcome.report, table) + "\n"
                                                     : outcome.other->Table(table) + "\n");

@@ -221,7 +221,8 @@ int Stiffness(const StiffnessArguments& arguments) {
   if (map_diagnostics.has_errors()) return 2;
   const bool json = arguments.format == "json";
   const TableOptions table{.color = WantsColor(arguments.json.text()),
-                           .verbose = arguments.verbose};
+                           .verbose = arguments.verbose,
+                           .columns = TerminalColumns(arguments.json.text())};
   if (json) {
     fmt::print("{}", ToJson(run.report));
   } else {
