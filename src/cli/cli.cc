@@ -108,9 +108,8 @@ std::pair<std::string, std::string> AboutUnknownWord(const CLI::App& app) {
     return {fmt::format("{} has no option '{}'", CommandPath(*command), Printable(word)),
             DidYouMean(word, names, "see " + CommandPath(*command) + " --help")};
   }
-  for (const CLI::App* known : command->get_subcommands([](const CLI::App*) { return true; })) {
-    names.push_back(known->get_name());
-  }
+  const auto shown = [](const CLI::App* one) { return !one->get_group().empty(); };
+  for (const CLI::App* known : command->get_subcommands(shown)) names.push_back(known->get_name());
   if (names.empty()) return {};
   return {fmt::format("there is no command '{} {}'", CommandPath(*command), Printable(word)),
           DidYouMean(word, names, "commands: " + Joined(names))};

@@ -37,7 +37,7 @@ TEST_F(CliTest, VersionAndHelpGoToStdout) {
 }
 
 TEST_F(CliTest, WrongUseIsBadInput) {
-  for (const char* arguments : {"", "rum", "run", "run --mode backward x.yaml", "model",
+  for (const char* arguments : {"rum", "run", "run --mode backward x.yaml", "model",
                                 "run x.yaml --set nonsense", "model no_such_model"}) {
     const ProgramResult result = mbverify(arguments);
     EXPECT_EQ(result.exit_code, 2) << arguments;
