@@ -36,7 +36,7 @@ def turned(v, axis, q):
 
 def why_not(m):
     if len(m["bodies"]) != 2 or len(m["joints"]) != 1 or m["joints"][0]["kind"] != "revolute":
-        return "it is no body on one revolute joint"
+        return "it is not a body on one revolute joint"
     if m["springs"] or m["elements"] or os.path.exists("start.csv") or len(open("loads.csv").readlines()) > 1:
         return "springs, force elements, loads and free motions are not known"
     return ""

@@ -103,7 +103,7 @@ TEST_F(Completion, OfZshKnowsCommandsOptionsWordsAndNames) {
 TEST_F(Completion, OtherShellsAreBadInput) {
   const ProgramResult result = mbverify("completion tcsh");
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_NE(result.err.find("none of bash, zsh, fish"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("not one of bash, zsh, fish"), std::string::npos) << result.err;
 }
 
 }  // namespace
