@@ -49,6 +49,7 @@ std::string OnOneLine(std::string text) {
 
 std::vector<std::string> Texts(const std::vector<Cell>& row) {
   std::vector<std::string> texts;
+  texts.reserve(row.size());
   for (const Cell& cell : row) texts.push_back(cell.text);
   return texts;
 }
