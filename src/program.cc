@@ -12,10 +12,10 @@ namespace mbv {
 
 using AddCommand = void(CLI::App* app, int* exit_code);
 AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, AddCheckCommand,
-    AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddMutateCommand,
-    AddConvergeCommand, AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand,
-    AddUpgradeCommand, AddFiguresCommand, AddTablesCommand, AddStudyCommand, AddPackageCommand,
-    AddVerifyCommand, AddSensitivityCommand, AddRegressCommand, AddMergeCommand, AddHistoryCommand;
+    AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddConvergeCommand,
+    AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
+    AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
+    AddMergeCommand, AddHistoryCommand;
 
 namespace {
 
@@ -51,12 +51,12 @@ constexpr std::array kCommands = {
     CommandRow{AddPackageCommand, kPublish, true},
     CommandRow{AddCompletionCommand, kShell},
     CommandRow{AddHelpCommand, kShell},
-    // Former names, and what the build asks.
-    CommandRow{AddMutateCommand},
-    CommandRow{AddUpgradeCommand},
-    CommandRow{AddVerifyCommand},
-    CommandRow{AddManPageCommand},
+    CommandRow{AddManPageCommand},  // the build asks for it
 };
+
+constexpr std::array kFormerNames = {FormerName{"mutate", {"sensitivity"}},
+                                     FormerName{"upgrade", {"crosscheck", "--newest"}},
+                                     FormerName{"verify", {"package", "--check"}}};
 
 Diagnostics CheckStiffness(const std::string& file) {
   Diagnostics diagnostics;
@@ -104,7 +104,7 @@ void UseDocumentKinds() { UseDocumentKinds(kDocuments); }
 
 int RunProgram(int argc, char** argv) {
   UseDocumentKinds();
-  return RunCli(argc, argv, kCommands);
+  return RunCli(argc, argv, kCommands, kFormerNames);
 }
 
 }  // namespace mbv

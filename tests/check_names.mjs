@@ -14,7 +14,7 @@ function libraryOf(path) {
 
 // What the lines from `i` on declare at the left margin of an unnamed namespace: {name, shape}, or
 // null. Two declarations of one name may live together when both are functions with different
-// parameters, or the same alias; their `shape` tells. Forward declarations of types count for
+// parameters, or the same alias; their `shape` reports. Forward declarations of types count for
 // nothing: the definition follows.
 function declared(lines, i) {
   const line = lines[i];

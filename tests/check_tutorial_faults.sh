@@ -39,21 +39,21 @@ expect() {  # WANTED_EXIT WHAT
   local got=$?
   [ "$got" = "$1" ] || { echo "$2: exit code $got"; cat "$work/said"; failed=1; }
 }
-bent() {  # WHAT SED_SCRIPT
+perturbed() {  # WHAT SED_SCRIPT
   sed "$2" "$work/right.md" >"$work/document.md"
-  cmp -s "$work/right.md" "$work/document.md" && { echo "$1: nothing bent"; failed=1; }
+  cmp -s "$work/right.md" "$work/document.md" && { echo "$1: nothing perturbed"; failed=1; }
   expect 1 "$1"
 }
 cp "$work/right.md" "$work/document.md"
 expect 0 "the document that is right"
-bent "another answer quoted" 's/^models.*: ok$/models\/m\/model.yaml: fine/'
-bent "a piece of an answer quoted" 's/^  degrees of freedom: 1 = .*/  degrees of freedom: 1/'
-bent "an answer that is not quoted" '/: ok$/d;/^\$ mbverify model/,/^…$/d'
-bent "an answer longer than quoted" '/^  degrees of freedom/,/^…$/{/^…$/d}'
-bent "another exit code quoted" 's/^2$/3/'
-bent "an exit code that nobody asks for" '/^\$ echo/,/^2$/d'
-bent "a block without a file" 's/^`models.*continued$/and more/'
-bent "a missing block" '/continued$/,/^```$/d'
-bent "a block of another kind" 's/^```console$/```sh/'
+perturbed "another answer quoted" 's/^models.*: ok$/models\/m\/model.yaml: fine/'
+perturbed "a piece of an answer quoted" 's/^  degrees of freedom: 1 = .*/  degrees of freedom: 1/'
+perturbed "an answer that is not quoted" '/: ok$/d;/^\$ mbverify model/,/^…$/d'
+perturbed "an answer longer than quoted" '/^  degrees of freedom/,/^…$/{/^…$/d}'
+perturbed "another exit code quoted" 's/^2$/3/'
+perturbed "an exit code that nobody asks for" '/^\$ echo/,/^2$/d'
+perturbed "a block without a file" 's/^`models.*continued$/and more/'
+perturbed "a missing block" '/continued$/,/^```$/d'
+perturbed "a block of another kind" 's/^```console$/```sh/'
 [ $failed = 0 ] && echo "every fault is found"
 exit $failed

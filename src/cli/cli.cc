@@ -14,6 +14,7 @@
 #include <cstring>
 #include <filesystem>
 #include <new>
+#include <ranges>
 #include <sstream>
 #include <system_error>
 
@@ -267,7 +268,27 @@ int WorseExit(int a, int b) {
   return kBadness[static_cast<size_t>(a)] >= kBadness[static_cast<size_t>(b)] ? a : b;
 }
 
-int RunCli(int argc, char** argv, std::span<const CommandRow> commands) {
+namespace {
+
+// From the last word to the first, without the program's name, as CLI11 takes them.
+std::vector<std::string> WordsOf(int argc, char** argv, std::span<const FormerName> former) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  for (const FormerName& name : former) {
+    if (words.empty() || words.front() != name.name) continue;
+    words.erase(words.begin());
+    for (const char* word : name.now | std::views::reverse) {
+      if (word != nullptr) words.insert(words.begin(), word);
+    }
+    break;
+  }
+  std::ranges::reverse(words);
+  return words;
+}
+
+}  // namespace
+
+int RunCli(int argc, char** argv, std::span<const CommandRow> commands,
+           std::span<const FormerName> former) {
   // A reader that went away (`| head`) and a limit of file sizes (`ulimit -f`) are failed writes,
   // which are reported; they do not end this process in silence with half of a result.
   std::signal(SIGPIPE, SIG_IGN);
@@ -302,7 +323,7 @@ int RunCli(int argc, char** argv, std::span<const CommandRow> commands) {
       fmt::print("{}", HelpFor(app.help(), HelpColumns()));
       exit_code = 2;
     } else {
-      app.parse(argc, argv);
+      app.parse(WordsOf(argc, argv, former));
     }
   } catch (const CLI::ParseError& error) {
     exit_code = AnswerParse(app, error);

@@ -5,6 +5,7 @@
 // stderr.
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "cli/cli.h"
@@ -18,7 +19,14 @@ struct CommandRow {
   bool reads_robots = false;                   ///< takes --package for the meshes of robots
 };
 
+/// A command that was called otherwise: its first word still works, but help does not show it.
+struct FormerName {
+  const char* name;
+  std::array<const char*, 2> now;  ///< words in its place; null: none
+};
+
 /// Runs the program with these commands, in the order of its help; never throws.
-[[nodiscard]] int RunCli(int argc, char** argv, std::span<const CommandRow> commands);
+[[nodiscard]] int RunCli(int argc, char** argv, std::span<const CommandRow> commands,
+                         std::span<const FormerName> former);
 
 }  // namespace mbv

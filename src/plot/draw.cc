@@ -288,15 +288,9 @@ class FigurePainter {
   }
 
   void Legend(const FigurePanel& panel, const PanelPlace& place) const {
-    const std::vector<const FigureCurve*> rows = LegendOf(panel);
-    if (rows.empty()) return;
-    const double column = (layout_.width - place.left) / static_cast<double>(place.legend_columns);
-    for (size_t k = 0; k < rows.size(); ++k) {
-      const double x = place.left + column * static_cast<double>(k % place.legend_columns);
-      const size_t line = k / place.legend_columns;
-      const double y = place.legend_top + layout_.row * (0.5 + static_cast<double>(line));
-      Sample(*rows[k], x, y);
-      canvas_.Text(rows[k]->label, {.x = x + kSampleWidth + kSampleGap, .y = y, .down = 0.5});
+    for (const auto& [curve, x, y] : LegendPlaces(layout_, panel, place)) {
+      Sample(*curve, x, y);
+      canvas_.Text(curve->label, {.x = x + kSampleWidth + kSampleGap, .y = y, .down = 0.5});
     }
   }
 

@@ -358,6 +358,19 @@ std::vector<const FigureCurve*> LegendOf(const FigurePanel& panel) {
   return rows;
 }
 
+std::vector<LegendPlace> LegendPlaces(const FigureLayout& layout, const FigurePanel& panel,
+                                      const PanelPlace& place) {
+  const double column = (layout.width - place.left) / static_cast<double>(place.legend_columns);
+  std::vector<LegendPlace> rows;
+  for (const FigureCurve* curve : LegendOf(panel)) {
+    const size_t line = rows.size() / place.legend_columns;
+    rows.push_back({curve,
+                    place.left + column * static_cast<double>(rows.size() % place.legend_columns),
+                    place.legend_top + layout.row * (0.5 + static_cast<double>(line))});
+  }
+  return rows;
+}
+
 FigureLayout LayOut(const Figure& figure, const FigureStyle& style) {
   return LayoutMaker(figure, style).Make();
 }

@@ -62,4 +62,13 @@ inline constexpr double kTextGap = 3.0;     ///< between axes and texts [pt]
 /// The rows of a panel's legend.
 [[nodiscard]] std::vector<const FigureCurve*> LegendOf(const FigurePanel& panel);
 
+/// A row of a legend: its sample begins at x, and y is the middle of its line [pt].
+struct LegendPlace {
+  const FigureCurve* curve = nullptr;
+  double x = 0, y = 0;
+};
+[[nodiscard]] std::vector<LegendPlace> LegendPlaces(const FigureLayout& layout,
+                                                    const FigurePanel& panel,
+                                                    const PanelPlace& place);
+
 }  // namespace mbv

@@ -121,21 +121,15 @@ class PgfWriter {
   }
 
   void Legend(const FigurePanel& panel, const PanelPlace& place) {
-    const std::vector<const FigureCurve*> rows = LegendOf(panel);
-    if (rows.empty()) return;
-    const double column = (layout_.width - place.left) / static_cast<double>(place.legend_columns);
-    for (size_t k = 0; k < rows.size(); ++k) {
-      const double x = place.left + column * static_cast<double>(k % place.legend_columns);
-      const size_t line = k / place.legend_columns;
-      const double y = place.legend_top + layout_.row * (0.5 + static_cast<double>(line));
-      if (rows[k]->line) {
-        Add("\\draw[{}] {} -- {};\n", LineLook(*rows[k]), At(x, y), At(x + kSampleWidth, y));
+    for (const auto& [curve, x, y] : LegendPlaces(layout_, panel, place)) {
+      if (curve->line) {
+        Add("\\draw[{}] {} -- {};\n", LineLook(*curve), At(x, y), At(x + kSampleWidth, y));
       }
-      if (rows[k]->marker >= 0) {
-        Add("\\draw[{}{}] plot coordinates {{{}}};\n", LineLook(*rows[k]), MarkLook(*rows[k]),
+      if (curve->marker >= 0) {
+        Add("\\draw[{}{}] plot coordinates {{{}}};\n", LineLook(*curve), MarkLook(*curve),
             At(x + 0.5 * kSampleWidth, y));
       }
-      Label(x + kSampleWidth + kSampleGap, y, rows[k]->label);
+      Label(x + kSampleWidth + kSampleGap, y, curve->label);
     }
   }
 

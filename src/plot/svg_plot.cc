@@ -9,6 +9,7 @@
 
 #include "base/demand.h"
 #include "base/markup.h"
+#include "base/text.h"
 #include "plot/svg.h"
 
 namespace mbv {
@@ -434,15 +435,9 @@ constexpr double kLetter = 6.6;                      // of a usual letter
 constexpr double kBarNumber = 70;  // of a column, for the number behind the longest bar
 constexpr std::array<const char*, 2> kBarColors = {"#0072b2", "#d55e00"};
 
-// The end of a name that has no room says more than its beginning.
-std::string FittedName(const std::string& name, double room) {
-  const auto most = static_cast<size_t>(room / kLetter);
-  return name.size() <= most ? name : "…" + name.substr(name.size() - most + 1);
-}
-
 std::string BarLine(const BarRow& row, double top, double scale, double names) {
   std::string svg = SvgText({{"x", names - 8}, {"y", top + 13}, {"text-anchor", "end"}},
-                            FittedName(row.name, names - 8)) +
+                            ShortenedName(row.name, static_cast<size_t>((names - 8) / kLetter))) +
                     "\n";
   for (size_t c = 0; c < row.shares.size(); ++c) {
     const double left = names + kBarColumn * static_cast<double>(c);
@@ -471,6 +466,16 @@ std::string BarLine(const BarRow& row, double top, double scale, double names) {
 }
 
 }  // namespace
+
+std::string ShortenedName(const std::string& name, size_t most) {
+  if (PrintedWidth(name) <= most) return name;
+  std::string end = name;
+  while (PrintedWidth(end) >= most) {
+    do end.erase(0, 1);
+    while (!end.empty() && (static_cast<unsigned char>(end[0]) & 0xc0) == 0x80);
+  }
+  return "…" + end;
+}
 
 std::string ToSvg(const BarPlot& plot) {
   double most = 1e-12;

@@ -67,6 +67,9 @@ struct BarPlot {
   size_t shown = 24;  ///< rows that are drawn, to the scale of all
 };
 
+/// A name of at most `most` letters: the end says more than the beginning.
+[[nodiscard]] std::string ShortenedName(const std::string& name, size_t most);
+
 [[nodiscard]] std::string ToSvg(const LinePlot& plot);
 /// Drawn from dark (low) to bright (high).
 [[nodiscard]] std::string ToSvg(const MapPlot& plot);

@@ -98,8 +98,7 @@ std::vector<std::string> TextLines(const Table& table, const TextStyle& style) {
     const Column& column = table.columns[shown[c]];
     std::vector<std::string> texts = {OnOneLine(column.title)};
     for (const auto& row : table.rows) texts.push_back(OnOneLine(PlainText(CellOf(row, shown[c]))));
-    size_t width = 0;
-    for (const std::string& text : texts) width = std::max(width, PrintedWidth(text));
+    const size_t width = WidthOf(table, shown[c]);
     for (size_t i = 0; i < lines.size(); ++i) {
       const std::string blanks(width - PrintedWidth(texts[i]), ' ');
       const Paint paint =

@@ -16,8 +16,8 @@ std::atomic<std::size_t> allocations{0};
 }  // namespace
 
 #ifdef __SANITIZE_ADDRESS__
-// The sanitizer's own allocator stays in place and tells what it gives out (GCC 12 lacks the header
-// that declares this function of it).
+// The sanitizer's own allocator stays in place and reports what it gives out (GCC 12 lacks the
+// header that declares this function of it).
 extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*,
                                                                            std::size_t),
                                                          void (*on_free)(const volatile void*));

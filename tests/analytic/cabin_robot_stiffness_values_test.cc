@@ -140,7 +140,7 @@ TEST(CabinStiffness, PrintedModelFailsThePapersOwnLimitOf15Percent) {
   EXPECT_NEAR(second.vector, 1.95, 5.1e-3);
 }
 
-TEST(CabinStiffness, RetractedRailIsNoBeam) {
+TEST(CabinStiffness, RetractedRailIsNotABeam) {
   StiffnessPose pose = FirstPose();
   pose.d5 = 0.0;
   const ToolStiffness tool = At(pose);

@@ -83,7 +83,7 @@ TEST(CabinReactions, EveryComponentIsTheReferences) {
   }
 }
 
-TEST(CabinReactions, ABentLinkIsSeen) {
+TEST(CabinReactions, APerturbedLinkIsSeen) {
   const ScenarioResult loaded =
       LoadedScenario("cabin_robot/default.yaml", {{"motion.sample_s", "0.25"}});
   for (const char* name : {"m_CD", "c_EF_x", "I_AB_z", "m_payload", "I_slewing_z"}) {
@@ -134,7 +134,7 @@ TEST(ScaraReactions, EveryComponentIsTheReferences) {
   }
 }
 
-TEST(ScaraReactions, ABentConstantIsSeen) {
+TEST(ScaraReactions, APerturbedConstantIsSeen) {
   const ScenarioResult loaded =
       LoadedScenario("scara_robot/pick_place.yaml", {{"motion.sample_s", "0.01"}});
   for (const char* name : {"m_p", "m_rods", "m_arm", "pivot_mass", "I_p_z"}) {

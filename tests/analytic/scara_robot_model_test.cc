@@ -182,7 +182,7 @@ TEST(ScaraModel, BearingsOnTheBarsAndTheirWidthChangeNoTorque) {
   }
 }
 
-TEST(ScaraModel, BentConstantsOfTheModelAreSeen) {
+TEST(ScaraModel, PerturbedConstantsOfTheModelAreSeen) {
   const MatX standard = PickPlaceTorques({}).closed_form;
   for (const auto& [name, value] : std::map<std::string, double>{{"m_p", 0.4677},
                                                                  {"m_rods", 0.2037},

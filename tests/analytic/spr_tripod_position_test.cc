@@ -103,7 +103,7 @@ TEST(SprTripodPosition, CorrectedCentreMeetsTheConstraints) {
     Posture p;
     FillPosture(g, CentreOf(g, tilt, z), tilt, &p);
     EXPECT_LT(ConstraintGap(p), kRoundoff_m);
-    // Bent by the printed torsion δ = +ψ, the gap must show.
+    // Perturbed by the printed torsion δ = +ψ, the gap must show.
     Posture perturbed = p;
     perturbed.R = RotZ(psi) * RotX(theta) * RotZ(psi);
     for (int i = 0; i < 3; ++i) perturbed.c[i] = perturbed.R * g.c[i];

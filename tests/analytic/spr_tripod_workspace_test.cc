@@ -265,7 +265,7 @@ TEST(SprTripodWorkspace, TwoWaysThatDifferAreAContradiction) {
   EXPECT_TRUE(Contradictions(report, regular).empty());
   report.convergence_order = 0.47;
   EXPECT_EQ(Contradictions(report, regular).size(), 1u);
-  report.convergence_order = kNan;  // what the meshes are off by cannot be told
+  report.convergence_order = kNan;  // what the meshes are off by cannot be reported
   EXPECT_TRUE(Contradictions(report, regular).empty());
   EXPECT_EQ(Contradictions(report, {-0.1, 1.9}).size(), 1u);
   report.volumes[1].value = kNan;

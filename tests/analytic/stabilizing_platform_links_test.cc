@@ -120,7 +120,7 @@ TEST(LimbSystem, CorrectedIsRegularAndAgreesWithTheClosedForm) {
   EXPECT_LE(worst_condition, 39);
 }
 
-TEST(LimbSystem, NoticesAWrenchBentByItsTolerance) {
+TEST(LimbSystem, NoticesAWrenchPerturbedByItsTolerance) {
   Evaluation e = Evaluate(PlatformEquations(Default(), DrivePairs::kSynchronous), SeaState(1.5));
   const double limit = 1e4 * kEps * 1.2e6;
   e.required[1][kLink1][0] += 20 * limit;  // N m at an arm of 3 m

@@ -72,8 +72,8 @@ TEST(ShareOut, GivesTheSameWithOneJobAndWithMany) {
   EXPECT_EQ(shared(1), shared(50));
 }
 
-// A killed process costs what it was at, and is told.
-TEST(ShareOut, TellsWhatWasLost) {
+// A killed process costs what it was at, and is reported.
+TEST(ShareOut, ReportsWhatWasLost) {
   size_t lost = 0, given = 0;
   ShareOut(
       6, 2,

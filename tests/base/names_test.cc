@@ -26,7 +26,7 @@ TEST(Names, HaveANearestOne) {
 }
 
 TEST(PlainPaths, StayBelowTheirFolder) {
-  for (const char* good : {"a", "a/b", "m/must_fail/x", "2026-01 night/x", "ä/b"}) {
+  for (const char* good : {"a", "a/b", "m/must_fail/x", "2026-01 regression/x", "ä/b"}) {
     EXPECT_TRUE(IsPlainPath(good)) << good;
     EXPECT_EQ(NearestPlainPath(good), good);
   }

@@ -106,7 +106,7 @@ TEST_F(OutputFolderTest, FilesOfTheUserStayWhereTheyAre) {
   struct stat before {
   }, after{};
   ASSERT_EQ(stat((folder / "notes.txt").c_str(), &before), 0);
-  for (int night = 0; night < 3; ++night) WriteResult("case", "new");
+  for (int regression = 0; regression < 3; ++regression) WriteResult("case", "new");
   EXPECT_EQ(Read(folder / "summary.json"), "new");
   EXPECT_EQ(Read(folder / "notes.txt"), "look at 3 s");
   EXPECT_EQ(Read(folder / "snapshots" / "photo.jpg"), "of the rig");

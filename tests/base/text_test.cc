@@ -21,7 +21,7 @@ const std::vector<std::string> kNoText = {"\x1b",
                                           "\xef\xbf\xbf",
                                           "\xe2\x82"};
 
-TEST(Text, ControlCharactersAndWhatIsNoUtf8AreFound) {
+TEST(Text, ControlCharactersAndWhatIsNotAnUtf8AreFound) {
   for (const std::string& bad : kNoText) {
     EXPECT_EQ(FindNonText("ab" + bad + "c"), 2u) << Printable(bad);
   }
@@ -69,7 +69,7 @@ TEST(Text, CellsOfCsvAreNotComputed) {
   EXPECT_EQ(CsvCell("=\"a\",\nb"), "\"'=\"\"a\"\", b\"");
 }
 
-TEST(Text, WhatIsNoTextIsReplacedInMarkup) {
+TEST(Text, WhatIsNotATextIsReplacedInMarkup) {
   for (const std::string& bad : kNoText) {
     const std::string escaped = EscapeMarkup("<" + bad + ">");
     EXPECT_EQ(FindNonText(escaped), std::string::npos) << Printable(escaped);
@@ -77,7 +77,7 @@ TEST(Text, WhatIsNoTextIsReplacedInMarkup) {
   }
 }
 
-TEST(Diagnostics, EachFindingIsToldOnce) {
+TEST(Diagnostics, EachFindingIsReportedOnce) {
   Diagnostics list, other;
   const Finding finding{Severity::kWarning, "a.yaml", 1, 1, "odd", "mend it"};
   list.Add(finding);

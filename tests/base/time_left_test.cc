@@ -9,7 +9,7 @@ namespace {
 TEST(TimeLeft, GoesOnAsFastAsSoFar) {
   TimeLeft left;
   EXPECT_EQ(left.Text(0.0, 100.0), "");
-  EXPECT_EQ(left.Text(0.05, 101.0), "");  // too early to tell
+  EXPECT_EQ(left.Text(0.05, 101.0), "");  // too early to report
   EXPECT_EQ(left.Text(0.1, 140.0), "about 6 min left");
   EXPECT_EQ(left.Text(0.5, 200.0), "about 2 min left");
   EXPECT_EQ(left.Text(0.8, 260.0), "about 40 s left");
@@ -25,7 +25,7 @@ TEST(TimeLeft, CountsFromTheFirstCallAndFromEachFall) {
   EXPECT_EQ(left.Text(0.1, 71.0), "about 90 s left");
 }
 
-TEST(TimeLeft, IsToldInUnitsThatPeopleUse) {
+TEST(TimeLeft, IsReportedInUnitsThatPeopleUse) {
   EXPECT_EQ(TimeText(12.4), "12 s");
   EXPECT_EQ(TimeText(180.0), "3 min");
   EXPECT_EQ(TimeText(9000.0), "2.5 h");

@@ -431,13 +431,14 @@ class TheirProgram {
 };
 
 // Every command that runs scenarios.
-const char* const kRunningCommands[] = {"run CASE --no-pictures --no-report --out OUT",
-                                        "run CASE -q --no-pictures --no-report --out OUT",
-                                        "regress CASE --no-pictures --no-reports --out OUT/night",
-                                        "figures CASE --formats svg --out OUT",
-                                        "tables CASE --out OUT",
-                                        "size CASE",
-                                        "package CASE --no-report --no-figures -o OUT.zip"};
+const char* const kRunningCommands[] = {
+    "run CASE --no-pictures --no-report --out OUT",
+    "run CASE -q --no-pictures --no-report --out OUT",
+    "regress CASE --no-pictures --no-reports --out OUT/regression",
+    "figures CASE --formats svg --out OUT",
+    "tables CASE --out OUT",
+    "size CASE",
+    "package CASE --no-report --no-figures -o OUT.zip"};
 
 TEST(TrustCommand, ProgramsOfOthersDoNotRunUnasked) {
   const TheirProgram theirs("unasked");
@@ -445,10 +446,11 @@ TEST(TrustCommand, ProgramsOfOthersDoNotRunUnasked) {
     const ProgramResult refused = theirs(command);
     EXPECT_EQ(refused.exit_code, 2) << command << refused.out;
     EXPECT_FALSE(theirs.ran()) << command;
-    for (const char* told :
+    for (const char* reported :
          {"case.yaml:4", "its programs may not run as you: there: /",
           "theirs/there.py (no folder above it is trusted)", "--trust", "mbverify trust "}) {
-      EXPECT_NE(refused.err.find(told), std::string::npos) << command << told << refused.err;
+      EXPECT_NE(refused.err.find(reported), std::string::npos)
+          << command << reported << refused.err;
     }
   }
   // Those that run no programs go on.
@@ -486,7 +488,7 @@ TEST(TrustCommand, TrustOfARunOrOfAFolderLetsThemRun) {
   EXPECT_NE(run.err.find("case.yaml runs programs as you:"), std::string::npos) << run.err;
   EXPECT_NE(run.err.find("there.py (in a trusted folder)"), std::string::npos) << run.err;
   EXPECT_NE(run.out.find("caveat: without the witness there"), std::string::npos) << run.out;
-  theirs("regress CASE --no-pictures --no-reports --out OUT/night");
+  theirs("regress CASE --no-pictures --no-reports --out OUT/regression");
   EXPECT_TRUE(theirs.ran());
   EXPECT_EQ(theirs("trust --remove " + theirs.Folder()).exit_code, 0);
   EXPECT_EQ(theirs("trust").out, "");
@@ -522,10 +524,10 @@ TEST(Terminal, GetsNoEscapesAndNoEndlessValuesOfOthers) {
   EXPECT_NE(loud.out.find(R"(a\x1b]0;title\x07\u202e\x0db)"), std::string::npos) << loud.out;
   EXPECT_EQ(loud.out.find(std::string(300, '1')), std::string::npos);
   const ProgramResult label = theirs(
-      "regress CASE --trust --no-pictures --no-reports --out OUT/night --label "
+      "regress CASE --trust --no-pictures --no-reports --out OUT/regression --label "
       "\"$(printf '=cmd|A1\\033[2J')\"");
   EXPECT_TRUE(fs::exists(theirs.Ran()) || label.exit_code < 2) << label.err;
-  const std::string history = "--history OUT/night/history.sqlite";
+  const std::string history = "--history OUT/regression/history.sqlite";
   const ProgramResult list = theirs("history list " + history);
   EXPECT_NE(list.out.find(R"(=cmd|A1\x1b[2J)"), std::string::npos) << list.out;
   const ProgramResult csv = theirs("history export " + history);

@@ -162,7 +162,7 @@ TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefusedBeforeAnythingIsComputed) {
   for (const char* name : {"model.yaml", "turn.yaml", "table.csv"}) {
     const fs::path input = In("own") / name;
     const std::string text = ReadAll(input);
-    // A video's name tells its format: a link.
+    // A video's name reports its format: a link.
     fs::remove(In("own/link.png"));
     fs::create_symlink(name, In("own/link.png"));
     for (const std::string& call :
@@ -203,11 +203,11 @@ TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefusedBeforeAnythingIsComputed) {
   EXPECT_EQ(ReadAll(history), bytes);
 }
 
-TEST_F(UserFilesTest, ReportsOfANightShareOneScript) {
-  const std::string night =
+TEST_F(UserFilesTest, ReportsOfARegressionShareOneScript) {
+  const std::string regression =
       "regress --quiet --no-history --no-pictures --out '" + mbverify.Out() + "' " + kScenario;
   const fs::path report = In("out/slider_crank/turn/report.html");
-  ASSERT_EQ(mbverify(night).exit_code, 0);
+  ASSERT_EQ(mbverify(regression).exit_code, 0);
   const std::string shared = ReadAll(report);
   const std::string before = "<script src=\"../../report-";
   const size_t at = shared.find(before);
@@ -216,15 +216,15 @@ TEST_F(UserFilesTest, ReportsOfANightShareOneScript) {
   const std::string script = shared.substr(begin, shared.find('"', begin) - begin);
   EXPECT_GT(fs::file_size(In("out") / script), 100'000u);
   EXPECT_LT(fs::file_size(report), 400'000u);
-  ASSERT_EQ(mbverify(night + " --embed").exit_code, 0);
+  ASSERT_EQ(mbverify(regression + " --embed").exit_code, 0);
   EXPECT_EQ(ReadAll(report).find("<script src="), std::string::npos);
   EXPECT_GT(fs::file_size(report), fs::file_size(In("out") / script));
-  ASSERT_EQ(mbverify(night + " --no-reports").exit_code, 0);
+  ASSERT_EQ(mbverify(regression + " --no-reports").exit_code, 0);
   EXPECT_FALSE(fs::exists(report));
   EXPECT_TRUE(fs::exists(report.parent_path() / "summary.json"));
   EXPECT_EQ(ReadAll(In("out/index.html")).find("report.html"), std::string::npos);
   // Joined folders take the script with them.
-  ASSERT_EQ(mbverify(night).exit_code, 0);
+  ASSERT_EQ(mbverify(regression).exit_code, 0);
   ASSERT_EQ(
       mbverify("merge '" + mbverify.Out() + "' --no-history --out '" + In("joined").string() + "'")
           .exit_code,

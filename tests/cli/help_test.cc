@@ -235,8 +235,11 @@ TEST_F(HelpTest, WrongOptionsAreErrorsWithTheUsage) {
   EXPECT_EQ(mbverify("sensitivity").err,
             "error: scenario is required\nusage: mbverify sensitivity [OPTIONS] scenario\n"
             "  hint: see mbverify sensitivity --help\n");
-  EXPECT_TRUE(mbverify("package --check a.zip b.yaml").err.starts_with("error: --check excludes"));
-  EXPECT_TRUE(mbverify("package").err.starts_with("error: scenario, or --check is required\n"));
+  EXPECT_EQ(mbverify("package --check a.zip b.yaml").err,
+            "error: package --check takes one archive\n");
+  EXPECT_TRUE(mbverify("package").err.starts_with("error: scenario is required\n"));
+  EXPECT_TRUE(
+      mbverify("package --check a.zip --force").err.starts_with("error: --check excludes --force"));
   EXPECT_TRUE(mbverify("crosscheck x --program y").err.starts_with("error: --program requires"));
 }
 

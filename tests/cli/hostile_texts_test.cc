@@ -88,7 +88,7 @@ CaseResult CaseOf(const std::string& text, bool failed) {
   return result;
 }
 
-RegressReport NightOf(const std::string& text) {
+RegressReport RegressionOf(const std::string& text) {
   RegressReport report = OneRun({CaseOf(text, true), CaseOf(text + "2", false)}, text);
   report.run.host = report.run.program = report.run.shard = text;
   report.notes = {text};
@@ -195,7 +195,7 @@ HandedMotion HandedOf() {
 
 // A history whose texts are hostile, as one that others wrote may be.
 std::string HistoryWith(const std::string& text, const std::string& path) {
-  RegressReport report = NightOf(text);
+  RegressReport report = RegressionOf(text);
   report.run.uid = "1";
   return AppendRun(path, {}, &report);
 }
@@ -211,7 +211,7 @@ const std::vector<Writer>& Writers() {
          return ToText(Finding{Severity::kError, t, 1, 1, t, t});
        }},
       {"regress", Format::kTerminal,
-       [](const std::string& t) { return ToSummaryText(NightOf(t)); }},
+       [](const std::string& t) { return ToSummaryText(RegressionOf(t)); }},
       {"history", Format::kTerminal,
        [](const std::string& t) {
          const test::TestFolder folder("hostile_history");
@@ -224,7 +224,8 @@ const std::vector<Writer>& Writers() {
        [](const std::string& t) { return ToText(MutationOf(t), false); }},
       {"verdict", Format::kTerminal,
        [](const std::string& t) { return VerdictLine(ViewOf(MotionOf(t)), {}); }},
-      {"regress", Format::kMarkdown, [](const std::string& t) { return ToMarkdown(NightOf(t)); }},
+      {"regress", Format::kMarkdown,
+       [](const std::string& t) { return ToMarkdown(RegressionOf(t)); }},
       {"table", Format::kMarkdown, [](const std::string& t) { return ToMarkdown(TableOf(t)); }},
       {"crosscheck", Format::kMarkdown,
        [](const std::string& t) { return ToMarkdown(EnginesOf(t)); }},
@@ -276,12 +277,13 @@ const std::vector<Writer>& Writers() {
        }},
       {"loads of a motion", Format::kCsv,
        [](const std::string& t) { return LoadsCsv(MechanismOf(t), HandedOf()); }},
-      {"junit", Format::kXml, [](const std::string& t) { return ToJUnit(NightOf(t)); }},
+      {"junit", Format::kXml, [](const std::string& t) { return ToJUnit(RegressionOf(t)); }},
       {"figure", Format::kXml,
        [](const std::string& t) {
          return SvgFigure(1, 1, t, SvgText({{"x", 1.0}, {"class", t}}, t));
        }},
-      {"regress", Format::kHtml, [](const std::string& t) { return ToIndexHtml(NightOf(t), {}); }},
+      {"regress", Format::kHtml,
+       [](const std::string& t) { return ToIndexHtml(RegressionOf(t), {}); }},
       {"crosscheck", Format::kHtml, [](const std::string& t) { return ToHtml(EnginesOf(t)); }},
       {"stiffness", Format::kHtml,
        [](const std::string& t) {
@@ -296,7 +298,7 @@ const std::vector<Writer>& Writers() {
        }},
       {"table", Format::kTex, [](const std::string& t) { return ToLatex(TableOf(t)); }},
       {"figure", Format::kTex, [](const std::string& t) { return ToTex(AsPlainText(t)); }},
-      {"regress", Format::kJson, [](const std::string& t) { return ToJson(NightOf(t)); }},
+      {"regress", Format::kJson, [](const std::string& t) { return ToJson(RegressionOf(t)); }},
       {"crosscheck", Format::kJson, [](const std::string& t) { return ToJson(EnginesOf(t)); }},
       {"mutate", Format::kJson, [](const std::string& t) { return ToJson(MutationOf(t)); }},
       {"survey", Format::kJson, [](const std::string& t) { return SurveyJson({RobotOf(t)}); }},

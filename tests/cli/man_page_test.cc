@@ -8,7 +8,7 @@
 namespace mbv {
 namespace {
 
-TEST(ManPage, TellsEveryCommandThatHelpShowsAndItsOptions) {
+TEST(ManPage, ReportsEveryCommandThatHelpShowsAndItsOptions) {
   const Program mbverify("man_page");
   const ProgramResult page = mbverify("man-page");
   ASSERT_EQ(page.exit_code, 0) << page.err;

@@ -103,7 +103,7 @@ TEST(Attribution, WrongDrivePositionsAreSeenInTheSimulatedPose) {
   EXPECT_TRUE(Mentions(attribution, "misses the commanded motion by 0.001 m")) << attribution.text;
 }
 
-TEST(Attribution, AWrongSimulatedModelIsToldFromWrongDriveMotion) {
+TEST(Attribution, AWrongSimulatedModelIsReportedFromWrongDriveMotion) {
   Case c;
   c.CommandPlate();
   Bend(&c.simulated, "plate.x", 1e-3);  // the drive motion is right in all three
@@ -113,8 +113,9 @@ TEST(Attribution, AWrongSimulatedModelIsToldFromWrongDriveMotion) {
 }
 
 TEST(Attribution, WrongDriveAccelerationsAreSeenInTheSimulatedAccelerationNotBlamedOnIt) {
-  // The closed form's acceleration is off, so coarsely sampled that its own rates do not tell; its
-  // forces do not use it. The simulation follows it: its forces are wrong, and it is not to blame.
+  // The closed form's acceleration is off, so coarsely sampled that its own rates do not report;
+  // its forces do not use it. The simulation follows it: its forces are wrong, and it is not to
+  // blame.
   Case c;
   c.CommandPlate();
   for (Trace* trace : {&c.analytic, &c.simulated}) Bend(trace, "d1.acceleration", 1.0);
@@ -141,7 +142,7 @@ TEST(Attribution, GuidanceThatHidesAWrongAccelerationLeavesItsPlaceToTell) {
   EXPECT_EQ(c.Run().attribution.odd_one_out, "analytic") << c.Run().attribution.text;
 }
 
-TEST(Attribution, AWrongReferenceMotionIsToldByTheSimulationThatMeetsTheCommand) {
+TEST(Attribution, AWrongReferenceMotionIsReportedByTheSimulationThatMeetsTheCommand) {
   Case c;
   c.CommandPlate();
   Bend(&c.reference, "d1.acceleration", 1.0);

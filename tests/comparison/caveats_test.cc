@@ -1,4 +1,4 @@
-// Agreements that verify nothing are not told as such, and those that verify less say so.
+// Agreements that verify nothing are not reported as such, and those that verify less say so.
 #include "comparison/caveats.h"
 
 #include <gtest/gtest.h>
@@ -83,7 +83,7 @@ Case Short(Eigen::Index rows) {
   return c;
 }
 
-TEST(Caveats, FewSamplesAndTheDerivativesTheyDoNotAllowAreSaid) {
+TEST(Caveats, FewSamplesAndTheDerivativesTheyDoNotAllowAreReported) {
   const Comparison seven = Short(7).Run();
   EXPECT_TRUE(seven.caveats.empty()) << seven.caveats.front().text;
   const Comparison six = Short(6).Run();

@@ -87,9 +87,9 @@ struct BendCase {
   }
 };
 
-class BentSimulation : public testing::TestWithParam<BendCase> {};
+class PerturbedSimulation : public testing::TestWithParam<BendCase> {};
 
-TEST_P(BentSimulation, FailsItsCheckAndTheVerdict) {
+TEST_P(PerturbedSimulation, FailsItsCheckAndTheVerdict) {
   Case c;
   Bend(&c.simulated, GetParam().channel, GetParam().offset);
   const Comparison comparison = c.Run();
@@ -97,14 +97,14 @@ TEST_P(BentSimulation, FailsItsCheckAndTheVerdict) {
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
 }
 
-TEST_P(BentSimulation, PassesWithAHundredthOfTheBend) {
+TEST_P(PerturbedSimulation, PassesWithAHundredthOfThePerturbation) {
   Case c;
   Bend(&c.simulated, GetParam().channel, 0.01 * GetParam().offset);
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Metrics, BentSimulation,
+    Metrics, PerturbedSimulation,
     testing::Values(
         BendCase{"d1.force", 2e-10 * 76.2, "simulated_vs_analytic.force_nrmse"},
         BendCase{"d1.position", 2e-10, "simulated_vs_analytic.position_m"},
@@ -123,7 +123,7 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
-TEST(Comparison, PowerThatFlowsTheOtherWayIsNoBalance) {
+TEST(Comparison, PowerThatFlowsTheOtherWayIsNotABalance) {
   Case c;
   Stretch(&c.simulated, "power.energy_rate", -1.0);
   const Comparison comparison = c.Run();

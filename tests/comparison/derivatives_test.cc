@@ -194,7 +194,7 @@ TEST(Derivatives, WrongRatesAreSeenThroughTheRoundingOfATable) {
 }
 
 // A drive of which most samples resolve nothing is not judged by the others either.
-TEST(Derivatives, WhatIsSaidNotToBeCheckedFailsNoCheck) {
+TEST(Derivatives, WhatIsReportedNotToBeCheckedFailsNoCheck) {
   Fast fast(3.0);
   synthetic::Stretch(&fast.trace, "d1.acceleration", 1.5);
   const WitnessMetrics metrics = fast.Measure();

@@ -72,7 +72,7 @@ TEST(DriveMotion, AFollowedMotionThatDiffersStillFails) {
 // Rates of the output: exact ones pass, those perturbed by twice the limit fail, whoever follows
 // whom.
 TEST(DriveMotion, OutputRatesAreHeldAgainstTheCommand) {
-  struct Bent {
+  struct Perturbed {
     const char *channel, *check;
     double twice_the_limit;
   };
@@ -82,11 +82,11 @@ TEST(DriveMotion, OutputRatesAreHeldAgainstTheCommand) {
   Case c;
   c.CommandPlate();
   const double w = 2.0 * std::numbers::pi;
-  for (const Bent& perturbed :
-       {Bent{"plate.x.velocity", "simulated.command_velocity", 2e-9 * 0.3},
-        Bent{"plate.yaw.velocity", "simulated.command_velocity", 2e-9 * 0.5},
-        Bent{"plate.x.acceleration", "simulated.command_acceleration",
-             2e-8 * 1e-3 * 0.5 * w * w / std::numbers::sqrt2}}) {
+  for (const Perturbed& perturbed :
+       {Perturbed{"plate.x.velocity", "simulated.command_velocity", 2e-9 * 0.3},
+        Perturbed{"plate.yaw.velocity", "simulated.command_velocity", 2e-9 * 0.5},
+        Perturbed{"plate.x.acceleration", "simulated.command_acceleration",
+                  2e-8 * 1e-3 * 0.5 * w * w / std::numbers::sqrt2}}) {
     Case exact = c;
     EXPECT_EQ(exact.Run().verdict, Verdict::kAgree) << exact.Run().reason;
     Case wrong = c;

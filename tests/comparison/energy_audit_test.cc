@@ -89,7 +89,7 @@ TEST(EnergyAudit, ADriveForceTooLargeByAThousandthIsFoundAndNamed) {
   EXPECT_EQ(audit.culprit, "d1");
   EXPECT_NEAR(audit.from_s, 0.01, 1e-12);
   EXPECT_NE(audit.text.find("work of d1 that is 0.1 % too large"), std::string::npos) << audit.text;
-  // The recorded forces alone are perturbed: the power balance tells.
+  // The recorded forces alone are perturbed: the power balance reports.
   Pushed forces;
   Stretch(&forces.trace, "d1.force", 1.001);
   const WitnessMetrics metrics = MeasureWitness(forces.Input(), forces.trace);
@@ -217,7 +217,7 @@ TEST(EnergyScale, BesideABaseIsWhatTheCarriedBodiesOrTheDrivesCanDo) {
   EXPECT_NEAR(run.Audit().scale_J, 1e-3 * at_rest.length_m * at_rest.force_N, 1e-12);
 }
 
-TEST(EnergyScale, AShareOfTheBasesEnergyIsNoDriftAndOfNothingElse) {
+TEST(EnergyScale, AShareOfTheBasesEnergyIsNotADriftAndOfNothingElse) {
   OnMovingVehicle run;
   const double base_J = 1e8 * std::sin(1.0) + 9.0;
   Bend(&run.trace, "d2.work", 0.5e-8 * base_J);
@@ -256,7 +256,7 @@ TEST(EnergyAudit, WithoutItsWorkABaseCountsWithItsPower) {
   EXPECT_NEAR(part->most_J, 1e6 * 27.0 / 256.0, 50.0);
 }
 
-TEST(EnergyAudit, WhatIsNotANumberIsNoBalance) {
+TEST(EnergyAudit, WhatIsNotANumberIsNotABalance) {
   Pushed run;
   run.trace.values(50, run.trace.Find("energy.springs")) = kNan;
   EXPECT_TRUE(std::isnan(run.Audit().drift.value));

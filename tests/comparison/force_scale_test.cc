@@ -78,7 +78,7 @@ TEST(ForceScale, AFreeHullCountsWithWhatItTakesToMoveTheArmOnly) {
   EXPECT_EQ(scale.driven[0], 0.0);
 }
 
-TEST(ForceScale, AFloorThatActsIsSaidBesideNrmseAndDigits) {
+TEST(ForceScale, AFloorThatActsIsReportedBesideNrmseAndDigits) {
   Case c;
   for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) Stretch(trace, "d2.force", 1e-6);
   const PairComparison pair = ComparePair(c.Input(), c.simulated, c.analytic);
@@ -448,7 +448,7 @@ TEST(PowerScale, WhatTheDrivesDoCountsBesideABaseHoweverHardTheyPush) {
               10.0 / drive.cwiseAbs().maxCoeff(), 1e-9);
 }
 
-TEST(PowerScale, RoundOffOfAHeavyBaseIsNoImbalance) {
+TEST(PowerScale, RoundOffOfAHeavyBaseIsNotAnImbalance) {
   Lifted c;
   for (const char* name : {"power.input", "power.energy_rate", "power.base"}) {
     Bend(&c.simulated, name, 1e11);

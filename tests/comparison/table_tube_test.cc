@@ -1,5 +1,5 @@
 // Judging against a table: rounding and noise pass, the smallest bend that they do not explain
-// fails, and a table that is wrong as a whole is told what it looks like.
+// fails, and a table that is wrong as a whole is reported what it looks like.
 #include "comparison/table_tube.h"
 
 #include <gtest/gtest.h>
@@ -103,7 +103,7 @@ TEST(TableTube, RoundingToAnyNumberOfDigitsPasses) {
     for (const TableColumnResult& column : pair->columns) {
       EXPECT_TRUE(column.inside()) << unit << " " << column.channel << " " << column.ratio();
       // Uniform rounding is unit / sqrt(12). A sine over its period repeats each rounding four
-      // times and so leaves some 25 independent rows to tell noise from: the estimate may be 2.5
+      // times and so leaves some 25 independent rows to report noise from: the estimate may be 2.5
       // times it.
       const double ratio = column.standard / (unit / std::sqrt(12.0));
       EXPECT_GE(ratio, 1.0 - 1e-9) << unit;
@@ -112,7 +112,7 @@ TEST(TableTube, RoundingToAnyNumberOfDigitsPasses) {
   }
 }
 
-TEST(TableTube, AColumnThatIsBentByThreeTimesItsRoundingFails) {
+TEST(TableTube, AColumnThatIsPerturbedByThreeTimesItsRoundingFails) {
   for (const double unit : {0.1, 1e-3, 1e-6}) {
     TableCase c;
     c.Print(unit);
@@ -334,7 +334,7 @@ TEST(TableDiagnosis, ADriftIsNamedWithItsRate) {
   EXPECT_TRUE(Says(comparison, "the difference grows by 0.5 N/s")) << All(comparison);
 }
 
-TEST(TableDiagnosis, AnErrorThatGrowsInSwingsIsSaidToGrow) {
+TEST(TableDiagnosis, AnErrorThatGrowsInSwingsIsReportedToGrow) {
   TableCase c;
   for (int i = 0; i <= 100; ++i) {
     const double t = 0.01 * i;
@@ -363,7 +363,7 @@ TEST(TableDiagnosis, AShiftInTimeIsFoundBetweenSamplesWithItsDirection) {
 }
 
 // Half a per cent of a force that hardly varies: a factor or an added constant.
-TEST(TableDiagnosis, WhatASignalThatHardlyVariesLeavesOpenIsSaid) {
+TEST(TableDiagnosis, WhatASignalThatHardlyVariesLeavesOpenIsReported) {
   const auto of = [](double swing, double factor) {
     TableCase c;
     for (int i = 0; i <= 100; ++i) {

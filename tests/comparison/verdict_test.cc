@@ -50,7 +50,7 @@ TEST(Verdict, OneOfFourIsOddWhereTheOthersAgree) {
   EXPECT_EQ(OddOneOut(split), "");
 }
 
-TEST(Verdict, WhatIsNoNumberIsFarthest) {
+TEST(Verdict, WhatIsNotANumberIsFarthest) {
   const std::vector<PairDistance> sorted = SortedDistances(kNothing, 1.0, kNothing);
   EXPECT_EQ(sorted[0].name(), "reference_vs_analytic");
   EXPECT_EQ(OddOneOut(sorted), "simulated");

@@ -136,7 +136,7 @@ TEST(ModelParameters, AreSetByTheSameWordsInEveryCommand) {
   }
 }
 
-TEST(Findings, AreToldOncePerCall) {
+TEST(Findings, AreReportedOncePerCall) {
   const Program mbverify("told_once");
   std::string model = ReadAll(kModels / "four_bar" / "model.yaml");
   const std::string motor = "motor: {";

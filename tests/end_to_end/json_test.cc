@@ -86,11 +86,11 @@ TEST_F(JsonOutput, OfOtherCommandsHoldsTheirNumbers) {
 TEST_F(JsonOutput, OfNightsAndTheirHistory) {
   const std::string history = mbverify.folder() / "history.sqlite";
   for (int run = 0; run < 2; ++run) {
-    const Json night =
+    const Json regression =
         Of(WithOut("regress scenarios/four_bar/turn_inverse.yaml --no-pictures "
                    "--no-reports --quiet --history " +
                    history));
-    EXPECT_EQ(night["cases"].size(), 1U);
+    EXPECT_EQ(regression["cases"].size(), 1U);
   }
   const Json runs = Of("history list --history " + history);
   EXPECT_EQ(runs["runs"].size(), 2U);

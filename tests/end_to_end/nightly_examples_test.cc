@@ -40,7 +40,7 @@ std::string AllRunText(const YAML::Node& job) {
   return text;
 }
 
-// What is wrong with a workflow of GitHub, "" if nothing: as far as can be told without it.
+// What is wrong with a workflow of GitHub, "" if nothing: as far as can be reported without it.
 std::string GithubTrouble(const YAML::Node& workflow) {
   std::string trouble;
   std::set<std::string> jobs;
@@ -72,7 +72,7 @@ std::string GithubTrouble(const YAML::Node& workflow) {
 TEST(NightlyExamples, TheGithubWorkflowHangsTogether) {
   const YAML::Node workflow = YAML::LoadFile(kNightly + "github-nightly.yml");
   EXPECT_EQ(GithubTrouble(workflow), "");
-  // One build for all of the night, from kept objects; nobody else compiles.
+  // One build for all of the regression, from kept objects; nobody else compiles.
   const YAML::Node jobs = workflow["jobs"];
   EXPECT_NE(AllRunText(jobs["build"]).find("scripts/setup --target mbverify"), std::string::npos);
   for (const char* job : {"shard", "report"}) {
@@ -125,7 +125,7 @@ TEST(NightlyExamples, TheGitlabPipelineHangsTogether) {
   }
   EXPECT_EQ(jobs, 3U);
   EXPECT_EQ(pipeline["report"]["artifacts"]["reports"]["junit"].as<std::string>(),
-            "night/junit.xml");
+            "regression/junit.xml");
   EXPECT_EQ(pipeline["report"]["when"].as<std::string>(), "always");
   EXPECT_TRUE(pipeline["build"]["cache"]);
 }
@@ -233,18 +233,18 @@ TEST(NightlyExamples, CronIsSilentWhenGreenOnly) {
   line = std::regex_replace(line, std::regex("^(\\S+ ){5}"), "");
   ASSERT_TRUE(line.starts_with("cd /srv/mbverify && ")) << line;
   line.replace(0, 16, "cd '" + mbverify.folder().string() + "'");
-  line = std::regex_replace(line, std::regex("/usr/local/bin/mbverify"), "./night");
+  line = std::regex_replace(line, std::regex("/usr/local/bin/mbverify"), "./regression");
   for (const int code : {0, 1, 3}) {
-    std::ofstream(mbverify.folder() / "night")
+    std::ofstream(mbverify.folder() / "regression")
         << "#!/bin/sh\necho 'one drifted'\necho 'talk' >&2\nexit " << code << "\n";
-    fs::permissions(mbverify.folder() / "night", fs::perms::owner_all);
+    fs::permissions(mbverify.folder() / "regression", fs::perms::owner_all);
     const ProgramResult result = mbverify.Script(line);
     EXPECT_EQ(result.err, "");
     EXPECT_EQ(result.out, code == 0 ? "" : "one drifted\ntalk\n") << code;
   }
 }
 
-TEST(NightlyExamples, TheServiceTellsWhenItFailed) {
+TEST(NightlyExamples, TheServiceReportsWhenItFailed) {
   const std::string service = ReadAll(kNightly + "mbverify-nightly.service");
   std::smatch failed;
   ASSERT_TRUE(std::regex_search(service, failed, std::regex("\nOnFailure=(\\S+)\n")));

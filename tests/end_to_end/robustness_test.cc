@@ -110,7 +110,7 @@ TEST_F(RobustnessTest, FilesOf10000LinesAreReadInSeconds) {
   EXPECT_EQ(bad.exit_code, 2);
   EXPECT_NE((bad.out + bad.err).find("more findings are left out"), std::string::npos);
   (void)mbverify("check " + Write("scenario.yaml", scenario));
-  // 1 s each on an idle machine; the limit only tells seconds from minutes.
+  // 1 s each on an idle machine; the limit only reports seconds from minutes.
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
 }
 
@@ -246,8 +246,8 @@ INSTANTIATE_TEST_SUITE_P(
         {"package", "package scenarios/slider_crank/turn.yaml -o OUT/p.zip", 4}}),
     [](const auto& info) { return std::string(info.param.name); });
 
-// `mbverify … | head`: a reader that goes away is told like any other lost output.
-TEST_F(RobustnessTest, AReaderThatGoesAwayIsToldAndIsNoSilentDeath) {
+// `mbverify … | head`: a reader that goes away is reported like any other lost output.
+TEST_F(RobustnessTest, AReaderThatGoesAwayIsReportedAndIsNotASilentDeath) {
   for (const std::string& command :
        {std::string("list"), std::string("audit spr_tripod"), Run(kSoundScenario),
         std::string("model scara_robot --format mjcf")}) {
@@ -310,7 +310,7 @@ TEST_F(RobustnessTest, NoSummaryReplacesWhatMbverifyDidNotWrite) {
   EXPECT_EQ(mbverify("list --json '" + own + "'").exit_code, 0);
 }
 
-TEST_F(RobustnessTest, ARegressionOnAFullDiskTellsWhyEachScenarioFailed) {
+TEST_F(RobustnessTest, ARegressionOnAFullDiskReportsWhyEachScenarioFailed) {
   const ProgramResult full = Shell("ulimit -f 40; \"$mbverify\" regress --no-pictures --out '" +
                                    mbverify.Out() + "' " + kSoundScenario);
   EXPECT_EQ(full.exit_code, 2) << "its own files do not fit, either";

@@ -1,4 +1,4 @@
-// mechanism.json: what is written passes, what is perturbed is told with its path.
+// mechanism.json: what is written passes, what is perturbed is reported with its path.
 #include "external/mechanism_json.h"
 
 #include <gtest/gtest.h>
@@ -58,10 +58,10 @@ TEST(MechanismCheck, TheSchemaKnowsAllJointKinds) {
 struct Bend {
   const char* what;
   std::function<void(Edited*)> edit;
-  std::string told;
+  std::string reported;
 };
 
-TEST(MechanismCheck, TellsWhatIsBent) {
+TEST(MechanismCheck, ReportsWhatIsPerturbed) {
   const std::string written = WrittenModel("four_bar");
   const Bend bends[] = {
       {"no mass", [](Edited* m) { (*m)["bodies"][1].erase("mass"); }, "bodies[1]: "},
@@ -105,7 +105,7 @@ TEST(MechanismCheck, TellsWhatIsBent) {
     Edited edited = Edited::parse(written);
     bend.edit(&edited);
     const std::string found = Findings(edited.dump());
-    EXPECT_NE(found.find(bend.told), std::string::npos) << bend.what << "\n" << found;
+    EXPECT_NE(found.find(bend.reported), std::string::npos) << bend.what << "\n" << found;
   }
   EXPECT_NE(Findings("{").find("the file ends before its JSON does"), std::string::npos);
   EXPECT_NE(Findings("[]"), "");

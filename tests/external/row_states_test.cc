@@ -38,7 +38,7 @@ TEST(RowStates, AnAnswerIsRead) {
   EXPECT_EQ(answer->states[0].force[0], 5.0);
 }
 
-TEST(RowStates, WhatDoesNotFitIsNoAnswer) {
+TEST(RowStates, WhatDoesNotFitIsNotAnAnswer) {
   std::string trouble;
   EXPECT_FALSE(ReadRowAnswer(kAnswer, 2, 1, &trouble));
   EXPECT_NE(trouble.find("does not fit"), std::string::npos);

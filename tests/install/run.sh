@@ -28,4 +28,4 @@ if build/my_mbverify run turn.yaml --quiet --no-pictures \
   --set 'motion.commands={slider.x: 0.4}' 2>../refused.log; then exit 1; else [ $? = 2 ]; fi
 grep -q 'takes the command' ../refused.log
 # The regression's workers are this program too.
-build/my_mbverify regress turn.yaml --no-pictures --no-history --quiet --out ../night
+build/my_mbverify regress turn.yaml --no-pictures --no-history --quiet --out ../regression

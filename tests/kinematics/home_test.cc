@@ -125,7 +125,7 @@ TEST(Home, TheWayToCloseThatIsNamedIsTaken) {
   EXPECT_LT((is - mirrored).norm(), 1e-11);
 }
 
-TEST(Home, AWayThatIsNotThereIsToldWithThoseThatAre) {
+TEST(Home, AWayThatIsNotThereIsReportedWithThoseThatAre) {
   Mechanism m = MakeFourBar();
   const HomeResult home = SolveHome(&m, {{"C", 3}, {"X", 1}});
   ASSERT_EQ(home.unmet.size(), 2u);
@@ -136,7 +136,7 @@ TEST(Home, AWayThatIsNotThereIsToldWithThoseThatAre) {
   EXPECT_EQ(home.unmet[1].found, 2);
 }
 
-TEST(Home, AMotorGuessThatCannotCloseIsMovedAndToldSo) {
+TEST(Home, AMotorGuessThatCannotCloseIsMovedAndReportedSo) {
   Mechanism m = MakeFourBar();
   m.joints[kA].X_PF.translation().x() = -0.35;  // ground distance 0.85: closes near θ1 = 0 only
   m.joints[kA].guess[0] = 2.5;

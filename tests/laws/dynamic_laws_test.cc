@@ -114,7 +114,7 @@ TEST_P(Forces, AreTheSameWhenTimeRunsBackwards) {
     const VecX ahead = asked.Force(state.command);
     back.velocity *= -1;
     VecX force = asked.Force(back);
-    // Bent: a dry friction that turns with the velocity.
+    // Perturbed: a dry friction that turns with the velocity.
     force += bend * ahead.lpNorm<Eigen::Infinity>() * VecX::Ones(force.size());
     return Residual{.error = RelativeError(force, ahead),
                     .budget = ForceBudget(subject(), state),
@@ -140,7 +140,7 @@ TEST_P(Forces, AreAffineInTheAcceleration) {
     const VecX sum = at_one + at_two - at_none;
     const double size =
         (at_one - at_none).lpNorm<Eigen::Infinity>() + (at_two - at_none).lpNorm<Eigen::Infinity>();
-    // Bent: the first acceleration too large in the sum.
+    // Perturbed: the first acceleration too large in the sum.
     both.acceleration +=
         bend * size / (at_one - at_none).lpNorm<Eigen::Infinity>() * one.acceleration;
     const VecX at_both = asked.Force(both);
@@ -256,7 +256,7 @@ TEST_P(Powers, OfTheForcesAreWhatTheEnergyGains) {
     double size = drive_power.lpNorm<1>() + base_power.lpNorm<1>();
     const double loads = PowerOfLoads(state.command, body.states, &size);
     const double gained = PowerOfInertia(subject().mechanism, body.states, &size);
-    // Bent: the drive that works most works too much.
+    // Perturbed: the drive that works most works too much.
     Eigen::Index most = 0;
     drive_power.cwiseAbs().maxCoeff(&most);
     const double extra = bend * std::copysign(size, drive_power[most]);

@@ -187,7 +187,7 @@ TEST(MotionLaws, FourierGivesAmplitudesOfTheRate) {
   }
 }
 
-TEST(MotionLaws, ViaRestsWhereItIsToldAndIsSmoothElsewhere) {
+TEST(MotionLaws, ViaRestsWhereItIsReportedAndIsSmoothElsewhere) {
   const std::vector<double> times = {0.0, 0.3, 0.5, 1.0, 1.4}, values = {0.1, -0.2, 0.4, 0.4, 0.0};
   const Piecewise p = Via(times, values, {false, false, true, false, false});
   for (size_t i = 0; i < times.size(); ++i) {

@@ -20,7 +20,7 @@ struct Slip {
 inline std::ostream& operator<<(std::ostream& out, const Slip& slip) { return out << slip.name; }
 
 /// What must be said is said of the good model with the slip, which loads if that is a warning.
-inline void ExpectSaid(const std::string& good, const Slip& slip) {
+inline void ExpectReported(const std::string& good, const Slip& slip) {
   const LoadResult result = LoadModelText(Replaced(good, slip.from, slip.to), "m.yaml");
   const std::string text = result.diagnostics.Text();
   EXPECT_NE(text.find(slip.said), std::string::npos) << text;

@@ -74,7 +74,7 @@ TEST(RoundedData, AreProjectedUpToTheStatedTolerance) {
   }
 }
 
-TEST(RoundedData, AWrongLengthIsNoRounding) {
+TEST(RoundedData, AWrongLengthIsNotARounding) {
   const std::string text = Replaced(kFourBar, "rocker:\n    frames: {foot: {}, end: [crank, 0, 0]}",
                                     "rocker:\n    frames: {foot: {}, end: [crank, 0, 0.05]}");
   const LoadResult loaded = LoadText("closure_tolerance: 1\n" + text);

@@ -119,7 +119,7 @@ TEST(Couplings, WhatMeansNothingIsAFinding) {
 }
 
 // Two gears between the same wheels with different offsets.
-TEST(Couplings, ThatContradictEachOtherAreToldWithTheirAmount) {
+TEST(Couplings, ThatContradictEachOtherAreReportedWithTheirAmount) {
   const std::string text = CouplingFindings(
       "  g: {joint: turn, follows: slide, ratio: 2}\n"
       "  h: {joint: turn, follows: slide, ratio: 2, offset_deg: 10}\n");

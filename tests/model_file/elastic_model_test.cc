@@ -155,7 +155,7 @@ joints: {mount: {kind: fixed, parent: world, child: base}}
 
 class BracketWith : public testing::TestWithParam<Slip> {};
 
-TEST_P(BracketWith, ASlipIsReported) { ExpectSaid(kBracket, GetParam()); }
+TEST_P(BracketWith, ASlipIsReported) { ExpectReported(kBracket, GetParam()); }
 
 const Slip kElasticSlips[] = {
     {"NoSuchSection", "section: bar", "section: bra",

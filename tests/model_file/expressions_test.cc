@@ -87,7 +87,7 @@ TEST(Expressions, NumbersBeyondBoundsAreRefused) {
   EXPECT_EQ(scope.Evaluate("-1e30").value, -1e30);
 }
 
-TEST(Expressions, WhatIsNoExpressionIsRefusedWithoutThrowing) {
+TEST(Expressions, WhatIsNotAnExpressionIsRefusedWithoutThrowing) {
   Scope scope;
   scope.Define("a", "1");
   for (const char* text : {"", " ", "1 +", "(2", "2)", "a = 3", "1, 2", "\"text\"", "a b", "1..2",
@@ -111,7 +111,7 @@ TEST(Expressions, AVeryLongChainOfParametersIsRefused) {
 }
 
 // Texts are kept parsed: what no parser takes is refused in the same words with other numbers.
-TEST(Expressions, WhatIsNoExpressionIsNoneWithOtherNumbersEither) {
+TEST(Expressions, WhatIsNotAnExpressionIsNoneWithOtherNumbersEither) {
   for (const char* text : {"r*pi.3", "r*(2", "r + ;", "sin(r, 2)"}) {
     std::vector<std::string> errors;
     for (const char* value : {"1", "2", "3"}) {
@@ -124,7 +124,7 @@ TEST(Expressions, WhatIsNoExpressionIsNoneWithOtherNumbersEither) {
   }
 }
 
-TEST(Expressions, WhatIsRefusedIsToldWhy) {
+TEST(Expressions, WhatIsRefusedHasAReason) {
   Scope scope;
   scope.Define("a", "1");
   const auto said = [&](const std::string& text) { return scope.Evaluate(text).error; };

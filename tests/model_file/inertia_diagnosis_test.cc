@@ -119,7 +119,7 @@ TEST(InertiaDiagnosis, FindsNothingInDifferencesOfRoundingAndMeshing) {
   }
 }
 
-// The limit tells: half of it passes, twice fails.
+// The limit reports: half of it passes, twice fails.
 TEST(InertiaDiagnosis, ADifferenceOfTwiceTheLimitIsFound) {
   const auto perturbed = [](double times) {
     return With(BoxPart(), [&](Body* b) {
@@ -296,7 +296,7 @@ TEST(InertiaDiagnosis, NamesAMeshThatIsNotClosed) {
   }
 }
 
-TEST(InertiaDiagnosis, WhatNoMistakeExplainsIsSaidSo) {
+TEST(InertiaDiagnosis, WhatNoMistakeExplainsIsReportedSo) {
   // A motor at one end.
   const Body part = With(EllipsoidPart(), [](Body* b) {
     b->I_Bcm_B(0, 0) *= 1.6;

@@ -22,7 +22,7 @@ std::string FindingsOf(const std::string& text, const LoadOptions& options = {})
 
 class FourBarWith : public testing::TestWithParam<Slip> {};
 
-TEST_P(FourBarWith, ASlipIsReported) { ExpectSaid(kFourBar, GetParam()); }
+TEST_P(FourBarWith, ASlipIsReported) { ExpectReported(kFourBar, GetParam()); }
 
 const Slip kSlips[] = {
     // Keys and types.

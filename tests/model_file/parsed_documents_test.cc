@@ -27,7 +27,7 @@ TEST(ParsedDocuments, NothingIsKeptWithoutOne) {
   EXPECT_NE(Parsed("a: 1"), Parsed("a: 1"));
 }
 
-TEST(ParsedDocuments, FindingsAreToldByEachReader) {
+TEST(ParsedDocuments, FindingsAreReportedByEachReader) {
   const ParsedDocuments documents;
   for (const char* file : {"one.yaml", "other.yaml"}) {
     YamlReader reader(file);

@@ -33,7 +33,7 @@ TEST(Plausibility, ARightModelRaisesNoDoubt) { EXPECT_EQ(WarningsOf(Slender()), 
 
 class Doubtful : public testing::TestWithParam<Slip> {};
 
-TEST_P(Doubtful, IsSaid) {
+TEST_P(Doubtful, IsReported) {
   const Slip& slip = GetParam();
   const std::string text = WarningsOf(Replaced(Slender(), slip.from, slip.to));
   EXPECT_NE(text.find(slip.said), std::string::npos) << text;
@@ -70,7 +70,7 @@ std::string Machine(const std::string& more, const std::string& lead = "lead_mm:
          lead + "}\ndrives: {da: {kind: joint, joint: ja}}\n" + more;
 }
 
-TEST(Plausibility, RotorsFrictionLeadsAndLocksAreSaid) {
+TEST(Plausibility, RotorsFrictionLeadsAndLocksAreReported) {
   EXPECT_EQ(WarningsOf(Machine("")), "");
   struct Case {
     std::string right, wrong;
@@ -114,7 +114,7 @@ TEST(Plausibility, RotorsFrictionLeadsAndLocksAreSaid) {
   }
 }
 
-TEST(Plausibility, LengthsInMillimetresAreSaidOnceForAllBodies) {
+TEST(Plausibility, LengthsInMillimetresAreReportedOnceForAllBodies) {
   std::string text = Replaced(Slender(), "crank: 0.2", "crank: 200");
   text = Replaced(text, "{value_mm: 500,", "{value: 500,");
   text = Replaced(text, "[ground/2, 0.1, 0]", "[ground/2, 100, 0]");
@@ -146,7 +146,7 @@ TEST(Plausibility, WhatIsRareButPossibleRaisesNoDoubt) {
 }
 
 // m l²/3 instead of m l²/12, of a bar that is drawn longer by its round ends.
-TEST(Plausibility, InertiaAboutTheEndOfAThickBarIsSaid) {
+TEST(Plausibility, InertiaAboutTheEndOfAThickBarIsReported) {
   for (const double radius : {0.001, 0.006, 0.012, 0.02, 0.03}) {
     for (const char* share : {"/3", "/12"}) {
       const std::string said = WarningsOf(fmt::format(
@@ -181,7 +181,7 @@ TEST(Plausibility, NoShippedModelRaisesADoubt) {
 
 // Links in one line, folded back: no small motion of a joint narrows the gap, so that only chance
 // leads out of it.
-TEST(Plausibility, APoseFoundFromDisturbedGuessesIsSaidToBeChance) {
+TEST(Plausibility, APoseFoundFromDisturbedGuessesIsReportedToBeChance) {
   std::ifstream stream(SourcePath("/models/four_bar/model.yaml"));
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   EXPECT_EQ(WarningsOf(text), "");

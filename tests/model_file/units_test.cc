@@ -56,7 +56,7 @@ TEST(Units, DegreesAreRoundedOnceForThePiOfExpressions) {
     EXPECT_EQ(kDeg.to_si(180.0 / n), std::numbers::pi / n) << "pi/" << n;
     EXPECT_EQ(kDeg.to_si(-180.0 / n), -std::numbers::pi / n) << "pi/" << n;
   }
-  // More digits than a double has tell what is nearest.
+  // More digits than a double has report what is nearest.
   static_assert(std::numeric_limits<long double>::digits >= 64);
   constexpr double kTwoLongRoundings = 0x1p-9;  // in half steps
   for (int i = 1; i < 36000; ++i) {

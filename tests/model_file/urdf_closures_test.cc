@@ -103,7 +103,7 @@ TEST(UrdfConstraint, AxesOfDifferentComponentsOnTheTwoSidesAreTheSameLine) {
 <child link="coupler"/><child_origin xyz="0.5 0 0" rpy="0 -1.5707963267948966 0"/>
 <child_axis xyz="1 0 0"/></constraint>)"),
                JointKind::kRevolute);
-  // Bent by a right angle, it cannot close.
+  // Perturbed by a right angle, it cannot close.
   const LoadResult perturbed = LoadFourBar("perturbed", R"(<constraint name="C" type="revolute">
 <parent link="rocker"/><parent_origin xyz="0.4 0 0"/><parent_axis xyz="0 0 1"/>
 <child link="coupler"/><child_origin xyz="0.5 0 0"/><child_axis xyz="1 0 0"/></constraint>)");
@@ -159,7 +159,7 @@ TEST(UrdfConstraint, ALoopThatDoesNotCloseIsFoundAtItsLine) {
   EXPECT_NE(text.find("urdf: {guess: …}"), std::string::npos) << text;
 }
 
-TEST(UrdfConstraint, WhatIsNotReadIsSaid) {
+TEST(UrdfConstraint, WhatIsNotReadIsReported) {
   Diagnostics diagnostics;
   const UrdfTree tree = ReadUrdf(
       FourBarUrdf(

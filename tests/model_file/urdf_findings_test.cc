@@ -28,7 +28,8 @@ std::string OpenLinkage(const std::string& more = "") {
 }
 
 // Findings of m.yaml, which takes r.urdf, without the folder's name.
-std::string Said(const std::string& model, const std::string& urdf, const std::string& closures) {
+std::string Reported(const std::string& model, const std::string& urdf,
+                     const std::string& closures) {
   const test::TestFolder folder(
       std::string("urdf_findings_") +
       std::to_string(testing::UnitTest::GetInstance()->current_test_info()->line()) + "_" +
@@ -45,9 +46,10 @@ std::string Said(const std::string& model, const std::string& urdf, const std::s
 
 class WrongClosures : public testing::TestWithParam<Wrong> {};
 
-TEST_P(WrongClosures, AreSaidInFull) {
-  EXPECT_EQ(Said("urdf: {file: r.urdf, closures: loops.yaml}\n", OpenLinkage(), GetParam().text),
-            GetParam().said);
+TEST_P(WrongClosures, AreReportedInFull) {
+  EXPECT_EQ(
+      Reported("urdf: {file: r.urdf, closures: loops.yaml}\n", OpenLinkage(), GetParam().text),
+      GetParam().said);
 }
 
 const Wrong kWrongClosures[] = {
@@ -102,8 +104,8 @@ INSTANTIATE_TEST_SUITE_P(UrdfFindings, WrongClosures, testing::ValuesIn(kWrongCl
 
 class WrongUrdfKey : public testing::TestWithParam<Wrong> {};
 
-TEST_P(WrongUrdfKey, IsSaidInFull) {
-  EXPECT_EQ(Said(GetParam().text, OpenLinkage(), ""), GetParam().said);
+TEST_P(WrongUrdfKey, IsReportedInFull) {
+  EXPECT_EQ(Reported(GetParam().text, OpenLinkage(), ""), GetParam().said);
 }
 
 const Wrong kWrongKeys[] = {
@@ -142,8 +144,8 @@ INSTANTIATE_TEST_SUITE_P(UrdfFindings, WrongUrdfKey, testing::ValuesIn(kWrongKey
 
 class WrongUrdf : public testing::TestWithParam<Wrong> {};
 
-TEST_P(WrongUrdf, IsSaidInFull) {
-  EXPECT_EQ(Said("urdf: r.urdf\n", OpenLinkage(GetParam().text), ""), GetParam().said);
+TEST_P(WrongUrdf, IsReportedInFull) {
+  EXPECT_EQ(Reported("urdf: r.urdf\n", OpenLinkage(GetParam().text), ""), GetParam().said);
 }
 
 const Wrong kWrongUrdfs[] = {
@@ -231,7 +233,7 @@ TEST(UrdfFindings, AHingeThatIsNamedABallIsOneWhereThatClosesTheLoops) {
   EXPECT_EQ(hinge.diagnostics.Text().find("whose name"), std::string::npos);
 }
 
-TEST(UrdfFindings, FramesThatMeetInPointsOnlyAreToldSo) {
+TEST(UrdfFindings, FramesThatMeetInPointsOnlyAreReportedSo) {
   const char* turned = R"(xyz="0.4 0 0" rpy="1.5707963267948966 0 0")";
   const LoadResult welded = LoadAlone("B", turned, "6d");
   EXPECT_FALSE(welded.mechanism);

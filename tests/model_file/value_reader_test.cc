@@ -22,7 +22,7 @@ class Values : public testing::Test {
   [[nodiscard]] YamlMap Map(const std::vector<std::string>& keys) {
     return {&yaml_, root_.get(), "", keys};
   }
-  [[nodiscard]] std::string Said() const { return yaml_.diagnostics().Text(); }
+  [[nodiscard]] std::string Reported() const { return yaml_.diagnostics().Text(); }
 
   YamlReader yaml_{"s.yaml"};
   Scope scope_;
@@ -35,7 +35,7 @@ TEST_F(Values, ANumberIsAnExpressionOfParameters) {
   EXPECT_EQ(values_.Number(At("a"), "a"), 7.0);
   EXPECT_FALSE(values_.Number(At("b"), "b"));
   EXPECT_FALSE(values_.Number(At("c"), "c"));
-  EXPECT_EQ(Said(),
+  EXPECT_EQ(Reported(),
             "s.yaml:2:4: error: b is a list of 1, a number is needed\n"
             "s.yaml:3:4: error: c = '3*M' has the unknown symbol 'M'\n"
             "  hint: did you mean 'L'?\n");
@@ -47,18 +47,18 @@ TEST_F(Values, APositiveNumberIsNotZero) {
   EXPECT_EQ(values_.Positive(At("a"), "a"), 2.0);
   EXPECT_FALSE(values_.Positive(At("b"), "b"));
   EXPECT_FALSE(values_.Positive(At("c"), "c"));
-  EXPECT_EQ(Said(),
+  EXPECT_EQ(Reported(),
             "s.yaml:2:4: error: b = 0 violates b > 0\n"
             "s.yaml:3:4: error: c = -1e-300 violates c > 0\n");
 }
 
-TEST_F(Values, AListIsWholeOrNotAtAllAndEveryBadItemIsSaid) {
+TEST_F(Values, AListIsWholeOrNotAtAllAndEveryBadItemIsReported) {
   Read("good: [1, L, pi]\nbad: [width, 2, [3]]\nshort: [1, 2]\n");
   EXPECT_EQ(values_.Numbers(At("good"), "good"), (std::vector<double>{1.0, 2.0, std::numbers::pi}));
   EXPECT_EQ(values_.Vector(At("good"), "good"), Vec3(1.0, 2.0, std::numbers::pi));
   EXPECT_FALSE(values_.Numbers(At("bad"), "bad"));
   EXPECT_FALSE(values_.Vector(At("short"), "short"));
-  EXPECT_EQ(Said(),
+  EXPECT_EQ(Reported(),
             "s.yaml:2:7: error: bad[0] = 'width' has the unknown symbol 'width'\n"
             "s.yaml:2:17: error: bad[2] is a list of 1, a number is needed\n"
             "s.yaml:3:8: error: short is a list of 2, a list of 3 is needed\n");
@@ -71,10 +71,10 @@ TEST_F(Values, AUnitIsThatOfTheKey) {
   EXPECT_EQ(values_.InUnit(map, "gap", {kPlain, kMm}), 0.009);
   EXPECT_FALSE(values_.InUnit(map, "gap", {kPlain})) << "a unit that this key may not have";
   EXPECT_FALSE(values_.InUnit(map, "none", {kPlain, kDeg, kMm}));
-  EXPECT_EQ(Said(), "");
+  EXPECT_EQ(Reported(), "");
   EXPECT_EQ(values_.InUnit(map, "both", {kPlain, kMm}), 1.0);
   EXPECT_FALSE(values_.InUnit(map, "bad", {kDeg}));
-  EXPECT_EQ(Said(),
+  EXPECT_EQ(Reported(),
             "s.yaml:4:10: error: both and both_mm are both given\n  hint: keep one of them\n"
             "s.yaml:5:10: error: bad_deg is a list of 1, a number is needed\n");
 }
@@ -85,7 +85,7 @@ TEST_F(Values, WhatIsRequiredIsMissed) {
   EXPECT_EQ(values_.RequiredPositive(map, "a"), 1.0);
   EXPECT_FALSE(values_.RequiredPositive(map, "b")) << "a key without value";
   EXPECT_FALSE(values_.RequiredPositive(map, "c"));
-  EXPECT_EQ(Said(),
+  EXPECT_EQ(Reported(),
             "s.yaml:1:1: error: the file: 'b' is missing\n"
             "s.yaml:1:1: error: the file: 'c' is missing\n");
 }
@@ -96,7 +96,7 @@ TEST_F(Values, OverridesAreThoseThatAreNumbers) {
   EXPECT_TRUE(ReadOverrides(&values_, &At("q"), "q").empty());
   EXPECT_TRUE(ReadOverrides(&values_, &At("r"), "r").empty());
   EXPECT_TRUE(ReadOverrides(&values_, nullptr, "s").empty());
-  EXPECT_EQ(Said(),
+  EXPECT_EQ(Reported(),
             "s.yaml:1:16: error: p.n = 'two' has the unknown symbol 'two'\n"
             "s.yaml:1:24: error: p.o is a map, a number is needed\n"
             "s.yaml:2:4: error: q is a list of 1, a map of names is needed\n");

@@ -72,7 +72,7 @@ TEST(WriteModel, NamesBecomeSuchAsModelFilesTake) {
 }
 
 // What looks like a rotation but is none is refused.
-TEST(WriteModel, AMatrixThatIsNoRotationIsRefused) {
+TEST(WriteModel, AMatrixThatIsNotARotationIsRefused) {
   const auto load = [](const std::string& matrix) {
     return LoadModelText("name: m\nworld: {frames: {f: {rotation: {matrix: " + matrix + "}}}}\n",
                          "m.yaml");

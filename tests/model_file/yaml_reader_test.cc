@@ -27,7 +27,7 @@ TEST(YamlReader, ValuesKnowTheirPlace) {
 }
 
 // A file that is not a map at all is of another kind, and may hold a secret.
-TEST(YamlReader, WhatIsNoMapIsNotQuoted) {
+TEST(YamlReader, WhatIsNotAMapIsNotQuoted) {
   YamlReader reader("token");
   const YamlNodePtr root = reader.Parse("hunter2\n");
   ASSERT_TRUE(root);
@@ -76,8 +76,8 @@ TEST(YamlReader, ReadersReportTheWrongTypeAndGoOn) {
 }
 
 // What is said about a map that may have these keys and lacks the required one.
-std::string SaidOfMap(const std::string& text, const std::string& path,
-                      const std::vector<std::string>& keys, const char* required = nullptr) {
+std::string ReportedOfMap(const std::string& text, const std::string& path,
+                          const std::vector<std::string>& keys, const char* required = nullptr) {
   YamlReader reader("a.yaml");
   const YamlNodePtr root = reader.Parse(text);
   const YamlMap map(&reader, root.get(), path, keys);
@@ -88,7 +88,7 @@ std::string SaidOfMap(const std::string& text, const std::string& path,
 }
 
 TEST(YamlReader, UnknownKeysAreFindingsWithTheNearestKnownOne) {
-  EXPECT_EQ(SaidOfMap("motoin: 1\nzzz: 2\n", "", {"name", "motion"}, "name"),
+  EXPECT_EQ(ReportedOfMap("motoin: 1\nzzz: 2\n", "", {"name", "motion"}, "name"),
             "a.yaml:1:1: error: the file: unknown key 'motoin'\n"
             "  hint: did you mean 'motion'?\n"
             "a.yaml:2:1: error: the file: unknown key 'zzz'\n"
@@ -97,7 +97,7 @@ TEST(YamlReader, UnknownKeysAreFindingsWithTheNearestKnownOne) {
 }
 
 TEST(YamlReader, ATextWithACommaInBracesIsExplained) {
-  EXPECT_EQ(SaidOfMap("{value: 1, note: a plate, 12 mm thick}", "p", {"value", "note"}),
+  EXPECT_EQ(ReportedOfMap("{value: 1, note: a plate, 12 mm thick}", "p", {"value", "note"}),
             "a.yaml:1:27: error: p: unknown key '12 mm thick'\n"
             "  hint: inside { } a text with a comma needs quotes\n");
 }
@@ -247,30 +247,30 @@ TEST(YamlReader, LongValuesAreCutBetweenCharacters) {
   for (int i = 0; i < 50; ++i) key += "ä";
   std::string shown = "x";
   for (int i = 0; i < 28; ++i) shown += "ä";
-  EXPECT_EQ(SaidOfMap("x" + key + "\n", "bodies", {"name"}),
+  EXPECT_EQ(ReportedOfMap("x" + key + "\n", "bodies", {"name"}),
             "a.yaml:1:1: error: bodies is '" + shown + "...', a map is needed\n");
   // Keys are shown up to 200 bytes.
-  EXPECT_EQ(SaidOfMap("x" + key + ": 1\n", "bodies", {"name"}),
+  EXPECT_EQ(ReportedOfMap("x" + key + ": 1\n", "bodies", {"name"}),
             "a.yaml:1:1: error: bodies: unknown key 'x" + key + "'\n  hint: known keys: name\n");
   const std::string longest(300, 'k');
-  EXPECT_EQ(SaidOfMap(longest + ": 1\n", "bodies", {"name"}),
+  EXPECT_EQ(ReportedOfMap(longest + ": 1\n", "bodies", {"name"}),
             "a.yaml:1:1: error: bodies: unknown key '" + longest.substr(0, 200) +
                 "… (300 bytes)'\n  hint: known keys: name\n");
-  EXPECT_EQ(SaidOfMap("\"two\\nlines\"\n", "bodies", {"name"}),
+  EXPECT_EQ(ReportedOfMap("\"two\\nlines\"\n", "bodies", {"name"}),
             "a.yaml:1:1: error: bodies is 'two...', a map is needed\n");
-  EXPECT_EQ(SaidOfMap("Fuß\n", "bodies", {"name"}),
+  EXPECT_EQ(ReportedOfMap("Fuß\n", "bodies", {"name"}),
             "a.yaml:1:1: error: bodies is 'Fuß', a map is needed\n");
 }
 
-TEST(YamlReader, AKeyAtTheWrongLevelIsToldWhereItBelongs) {
+TEST(YamlReader, AKeyAtTheWrongLevelIsReportedWhereItBelongs) {
   // Too far out, too far in, and an entry that its section lost.
-  EXPECT_EQ(SaidOfMap("1", "bodies.mass", {"mass", "com"}),
+  EXPECT_EQ(ReportedOfMap("1", "bodies.mass", {"mass", "com"}),
             "a.yaml:1:1: error: bodies.mass is '1', a map is needed\n"
             "  hint: 'mass' belongs into an entry of bodies: indent it deeper\n");
-  EXPECT_EQ(SaidOfMap("mass: 1\nrod: {mass: 2}\n", "bodies.bar", {"mass", "com"}),
+  EXPECT_EQ(ReportedOfMap("mass: 1\nrod: {mass: 2}\n", "bodies.bar", {"mass", "com"}),
             "a.yaml:2:1: error: bodies.bar: unknown key 'rod'\n"
             "  hint: it looks like another entry of the level above: indent it less\n");
-  EXPECT_EQ(SaidOfMap("joints:\npivot: {kind: fixed}\n", "", {"name", "joints"}),
+  EXPECT_EQ(ReportedOfMap("joints:\npivot: {kind: fixed}\n", "", {"name", "joints"}),
             "a.yaml:2:1: error: the file: unknown key 'pivot'\n"
             "  hint: if it belongs into 'joints', indent it deeper\n");
 }
@@ -287,7 +287,7 @@ TEST(YamlReader, TheSameMessageIsGivenOnceWhateverItsNote) {
   EXPECT_FALSE(reader.has_errors());
 }
 
-TEST(YamlReader, OddTextsAreToldApart) {
+TEST(YamlReader, OddTextsAreReportedApart) {
   const auto said = [](const std::string& text) {
     YamlReader reader("a.yaml");
     (void)reader.Parse(text);

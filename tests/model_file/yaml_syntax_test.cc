@@ -1,4 +1,4 @@
-// Slips of indentation and punctuation are told as such, at their place.
+// Slips of indentation and punctuation are reported as such, at their place.
 #include <gtest/gtest.h>
 
 #include "base/diagnostics.h"
@@ -55,7 +55,7 @@ const Slip kSyntaxSlips[] = {
 INSTANTIATE_TEST_SUITE_P(YamlSyntax, IndentedWrongly, testing::ValuesIn(kSyntaxSlips),
                          [](const auto& info) { return std::string(info.param.name); });
 
-TEST(YamlSyntax, WhatTheFileSaysInsideTextIsNoCause) {
+TEST(YamlSyntax, WhatTheFileSaysInsideTextIsNotACause) {
   const std::string text = SyntaxFindings(
       "name: a\n"
       "description: |\n"
@@ -72,7 +72,7 @@ TEST(YamlSyntax, WhatTheFileSaysInsideTextIsNoCause) {
       << text;
 }
 
-TEST(YamlSyntax, AnEntryBesideItsSectionIsToldToBeIndented) {
+TEST(YamlSyntax, AnEntryBesideItsSectionIsReportedToBeIndented) {
   const std::string text = SyntaxFindings(
       "name: a\nbodies: {bar: {mass: 1, inertia: [1, 1, 1]}}\n"
       "joints:\npivot: {kind: fixed, parent: world, child: bar}\n");
@@ -81,14 +81,14 @@ TEST(YamlSyntax, AnEntryBesideItsSectionIsToldToBeIndented) {
       << text;
 }
 
-TEST(YamlSyntax, AKeyOfAnEntryBesideItIsToldToBeIndented) {
+TEST(YamlSyntax, AKeyOfAnEntryBesideItIsReportedToBeIndented) {
   const std::string text = SyntaxFindings("name: a\nbodies:\n  bar:\n  mass: 1\n");
   EXPECT_NE(text.find("'mass' belongs into an entry of bodies: indent it deeper"),
             std::string::npos)
       << text;
 }
 
-TEST(YamlSyntax, AnEntryInsideAnotherIsToldToBeIndentedLess) {
+TEST(YamlSyntax, AnEntryInsideAnotherIsReportedToBeIndentedLess) {
   const std::string text =
       SyntaxFindings("name: a\nbodies:\n  bar:\n    mass: 1\n    rod:\n      mass: 1\n");
   EXPECT_NE(text.find("bodies.bar: unknown key 'rod'\n  hint: it looks like another entry of the "

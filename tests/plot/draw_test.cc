@@ -61,7 +61,7 @@ TEST(DrawFigure, CurvesGoThroughTheirPoints) {
   }
 }
 
-TEST(DrawFigure, OneBentPointIsSeen) {
+TEST(DrawFigure, OnePerturbedPointIsSeen) {
   Figure figure = TwoPanels();
   const FigurePoints straight = PlacedPoints(figure, 0, 0);
   figure.panels[0].curves[0].points[2].second += 0.05;  // of a range of 4
@@ -82,7 +82,7 @@ TEST(DrawFigure, APointBetweenGapsIsADot) {
   EXPECT_EQ(filled(dots), 2u);
 }
 
-TEST(DrawFigure, CurvesAreToldApartInGrey) {
+TEST(DrawFigure, CurvesAreReportedApartInGrey) {
   const FigureStyle style = FigureStyles()[0];
   Figure figure = TwoPanels();
   figure.panels.resize(1);

@@ -17,7 +17,7 @@ TEST(FigureMarkup, ForTexSpecialCharactersAreEscaped) {
   EXPECT_EQ(ToTex("*k*_{a,b}"), "\\textit{k}\\textsubscript{a,b}");
 }
 
-TEST(FigureMarkup, VerbatimTextIsNoMarkup) {
+TEST(FigureMarkup, VerbatimTextIsNotAMarkup) {
   const std::string name = "a*b_{c}^{d}\\e";
   EXPECT_EQ(ToPango(AsPlainText(name), 8), name);
   EXPECT_NE(ToPango(name, 8), name);

@@ -44,7 +44,7 @@ TEST(StyleFile, ChangesWhatItStatesAndLeavesTheRest) {
   EXPECT_EQ(other->font, FindFigureStyle("ieee")->font);
 }
 
-TEST(StyleFile, AllMistakesAreToldWithTheirPlaces) {
+TEST(StyleFile, AllMistakesAreReportedWithTheirPlaces) {
   std::string findings;
   EXPECT_FALSE(
       StyleOf("based_on: spriner\nfont_pt: 0\nwidth_mm: wide\nline: 1\ncolors: [red, \"#12345g\"]\n"

@@ -27,7 +27,7 @@ TEST(TextMask, IsAsWideAsItSaysAndAsHighAsALine) {
   }
 }
 
-TEST(TextMask, TellsCharactersApartAndTakesNoMarkup) {
+TEST(TextMask, DistinguishesCharactersAndTakesNoMarkup) {
   EXPECT_NE(DrawText("5°", 30.0).coverage, DrawText("5?", 30.0).coverage);
   EXPECT_NE(DrawText("m²", 30.0).coverage, DrawText("m2", 30.0).coverage);
   EXPECT_GT(TextWidth("<b>x</b> & y", 30.0), TextWidth("x & y", 30.0) + 50.0);

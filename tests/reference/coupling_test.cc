@@ -53,7 +53,7 @@ TEST(ReferenceCoupling, HomeMeetsIt) {
   EXPECT_NEAR(m.joints[1].home[0], 0.3 - 0.4 * 0.7 + 0.015 * 0.49, 1e-12);
 }
 
-TEST(ReferenceCoupling, ContradictionIsToldWithItsAmount) {
+TEST(ReferenceCoupling, ContradictionIsReportedWithItsAmount) {
   Mechanism m = CoupledWheels().Make();
   Coupling other = m.couplings[0];
   other.name = "belt";

@@ -56,22 +56,22 @@ TEST(Forward, AMassOnASpringSwingsLikeACosine) {
   EXPECT_NEAR(energy.minCoeff(), 0.5 * k * x0 * x0, kIntegrated);
 }
 
-// Long before the steps are spent: the rate of the spring tells what the rest would take.
+// Long before the steps are spent: the rate of the spring reports what the rest would take.
 TEST(Forward, AnIntegrationThatWouldTakeTooLongIsGivenUpEarly) {
   const Mechanism m = SpringMass(1.0, 1e8, 0.0);
-  std::vector<double> told;
+  std::vector<double> reported;
   const ForwardRun run =
       RunForwardReference(m, FreeMotion(m, 0.1, 0.0, 60.0),
-                          {.progress = [&](double fraction) { told.push_back(fraction); }});
+                          {.progress = [&](double fraction) { reported.push_back(fraction); }});
   EXPECT_EQ(run.summary.stop, Stop::kNoConvergence);
   EXPECT_NE(run.summary.message.find("spring 'spring' lets the mechanism move at 1e+04 rad/s"),
             std::string::npos)
       << run.summary.message;
   EXPECT_GT(run.summary.time_s, 0.0);
   EXPECT_LE(run.steps, 1000);
-  ASSERT_FALSE(told.empty());
-  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
-  EXPECT_LT(told.back(), 1.0 / 3.0);
+  ASSERT_FALSE(reported.empty());
+  EXPECT_TRUE(std::is_sorted(reported.begin(), reported.end()));
+  EXPECT_LT(reported.back(), 1.0 / 3.0);
 }
 
 TEST(Forward, WhatTheStepsSufficeForIsIntegratedToItsEnd) {
@@ -190,7 +190,7 @@ TEST(Forward, AParallelogramTurnsEvenlyThroughItsFlatPoses) {
 }
 
 // Turned as a whole by 64.6°, its crank is flat at 244.6° in the world: among the nodes of the
-// bridge its quaternion, which is told from the rotation, changes its sign (at 240°).
+// bridge its quaternion, which is reported from the rotation, changes its sign (at 240°).
 TEST(Forward, ABridgeGoesOnWhereAQuaternionChangesItsSign) {
   const double start = 1.0, rate = 2.5, turned = 240.0 / 180.0 * std::numbers::pi + 0.08;
   Mechanism m = MakeParallelogram(start);

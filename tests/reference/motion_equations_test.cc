@@ -89,7 +89,7 @@ TEST(MotionEquations, RowsThatAreNotIndependentAreGivenBack) {
   EXPECT_FALSE(equations.chosen());
 }
 
-// What tells a row from one nearly like it may be round-off, though it can be solved for.
+// What reports a row from one nearly like it may be round-off, though it can be solved for.
 TEST(MotionEquations, RowsThatAreNearlyDependentAreGivenBack) {
   const Mechanism mechanism = Shipped("slider_crank");
   BodyStates states;

@@ -180,8 +180,8 @@ TEST(Stewart, LegsWithTwoBallsAreLegsWithOneWhereNothingHasInertiaAboutTheLine) 
   EXPECT_GT(LargestForceDifference(balls, Dance(WithLegs(false, "0.001"))), 1e-3);
 }
 
-// What turns the leg about its line is told: the spin would not stay what it was.
-TEST(Stewart, AMomentAboutALegsLineIsNoIdleSpin) {
+// What turns the leg about its line is reported: the spin would not stay what it was.
+TEST(Stewart, AMomentAboutALegsLineIsNotAnIdleSpin) {
   Mechanism mechanism = WithLegs(true, "0.001");
   Motion motion = At({0.0, 0.0, kHeight_m, 0.0, 0.0, 0.0});
   Load load;

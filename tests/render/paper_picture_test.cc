@@ -243,7 +243,7 @@ TEST(ScaleBar, IsOfARoundLengthAndAsLongAsItSays) {
   Picture picture = Paper(800, 600);
   PaintScaleBar(1.2, true, 600, &picture);  // 0.5 m per 250 px; a quarter of the width is 0.4 m
   EXPECT_EQ(LongestRow(picture), 100);      // 0.2 m
-  // Perspective is told in words.
+  // Perspective is reported in words.
   Picture other = Paper(800, 600);
   PaintScaleBar(1.2, false, 600, &other);
   EXPECT_EQ(LongestRow(other), 100);
@@ -280,7 +280,7 @@ TEST(Labels, LieOverNoOtherAndLeaveNoneOut) {
     each += PixelsWhere(one, ink);
   }
   EXPECT_GT(all, each - each / 10);
-  // Crowded into a corner, some find no room, and that is told.
+  // Crowded into a corner, some find no room, and that is reported.
   Picture strip = Paper(640, 480);
   for (Label& label : labels) label = {.x = 0.5, .y = 0.02, .text = "a_very_long_name"};
   EXPECT_GT(PaintLabels(labels, 20, &strip), 0);

@@ -175,7 +175,7 @@ TEST(DataFile, TheSameValuesGiveTheSameBytesLater) {
   }
 }
 
-TEST(DataFile, WhatCannotBeWrittenIsSaid) {
+TEST(DataFile, WhatCannotBeWrittenIsReported) {
   const Trace trace = Simulated();
   for (const DataFormat& format : DataFormats()) {
     EXPECT_EQ(format.write("/nowhere/traces", {}, {&trace}), "cannot write /nowhere/traces");

@@ -79,7 +79,7 @@ TEST(Table, MarkdownIsATableUnderItsCaption) {
 )");
 }
 
-TEST(Table, ABentCellIsShown) {
+TEST(Table, APerturbedCellIsShown) {
   Table table = TwoRows();
   table.rows[0][1] = "1.51";
   EXPECT_NE(ToLatex(table), ToLatex(TwoRows()));

@@ -30,7 +30,7 @@ TEST(FullReport, SummaryIsAsWritten) {
   ExpectGolden("summary_full.json", Rounded(json).dump(2) + "\n");
 }
 
-TEST(FullReport, TheShortLineTellsCaveats) {
+TEST(FullReport, TheShortLineReportsCaveats) {
   const Report report = test::FullReport();
   EXPECT_EQ(VerdictLine(ViewOf(report), {}),
             "two_sliders / full: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  the "
@@ -41,7 +41,7 @@ TEST(FullReport, TheShortLineTellsCaveats) {
 struct FullBending {
   const char* what;
   std::function<void(test::FullPage*)> bend;
-  std::set<std::string> unseen = {};  // where it is not told: it has no place there
+  std::set<std::string> unseen = {};  // where it is not reported: it has no place there
 };
 
 PairComparison& PairOf(test::FullPage* f, const char* name) {

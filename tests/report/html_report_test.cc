@@ -23,12 +23,12 @@ using Json = nlohmann::json;
 using synthetic::Case;
 
 // Two sliders, simulation 1 % off on d1; three frames in which body b moves along x.
-struct BentPage {
+struct PerturbedPage {
   Case c;
   Report report;
   std::vector<std::vector<Pose>> poses;
 
-  BentPage() {
+  PerturbedPage() {
     c.column = LimitColumn::kForward;
     synthetic::Stretch(&c.simulated, "d1.force", 1.01);
     report.scenario = "perturbed";
@@ -92,7 +92,7 @@ TEST(HtmlText, FloatsComeBackAsTheyWere) {
 }
 
 TEST(HtmlData, TheErrorIsRelativeToTheLargestForceOfItsUnit) {
-  const BentPage page;
+  const PerturbedPage page;
   const Json data = Json::parse(PageData(page.input()));
   const Json& pair = data["pairs"][0];
   ASSERT_EQ(pair["name"], "simulated_vs_analytic");
@@ -104,8 +104,8 @@ TEST(HtmlData, TheErrorIsRelativeToTheLargestForceOfItsUnit) {
 }
 
 // d1 rests at the last two samples, within 7 N.
-BentPage RestingPage() {
-  BentPage page;
+PerturbedPage RestingPage() {
+  PerturbedPage page;
   Trace& trace = page.report.witnesses[1].trace;
   trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));
   trace.values.conservativeResize(Eigen::NoChange, trace.values.cols() + 1);
@@ -124,12 +124,12 @@ TEST(HtmlData, ForcesThatRestLeavesOpenHaveABand) {
 }
 
 TEST(StaticPlots, StrokeWhatRestLeavesOpen) {
-  EXPECT_EQ(StaticPlotsHtml(BentPage().report).find("d1, at rest"), std::string::npos);
+  EXPECT_EQ(StaticPlotsHtml(PerturbedPage().report).find("d1, at rest"), std::string::npos);
   EXPECT_NE(StaticPlotsHtml(RestingPage().report).find("d1, at rest"), std::string::npos);
 }
 
 TEST(HtmlData, ThinningKeepsTheWorstSample) {
-  BentPage page;
+  PerturbedPage page;
   // One wrong sample among 10001.
   Trace exact;
   exact.Reset(SampleTimes(100.0, 0.01), DriveChannels(page.c.mechanism));
@@ -145,7 +145,7 @@ TEST(HtmlData, ThinningKeepsTheWorstSample) {
 }
 
 TEST(HtmlData, PosesAreThoseOfTheSimulation) {
-  const BentPage page;
+  const PerturbedPage page;
   const Json replay = Json::parse(PageData(page.input()))["replay"];
   EXPECT_TRUE(replay["simulated"]);
   EXPECT_EQ(replay["bodies"][1]["poses"].size(), 7U);  // at rest: one pose
@@ -157,7 +157,7 @@ TEST(HtmlData, PosesAreThoseOfTheSimulation) {
 }
 
 TEST(HtmlData, PosesEndWhereTheSimulationFailed) {
-  BentPage page;
+  PerturbedPage page;
   page.poses[2][2].translation().setConstant(kNan);
   const Json replay = Json::parse(PageData(page.input()))["replay"];
   EXPECT_EQ(replay["time"].size(), 2U);
@@ -168,13 +168,13 @@ TEST(HtmlData, PosesEndWhereTheSimulationFailed) {
     EXPECT_EQ(poses.is_string() ? poses.get<std::string>().size() : poses.size(), expected);
   }
   // Without the failure the third pose is there, too.
-  const Json whole = Json::parse(PageData(BentPage().input()))["replay"];
+  const Json whole = Json::parse(PageData(PerturbedPage().input()))["replay"];
   EXPECT_GT(whole["time"].size(), 2U);
   EXPECT_EQ(whole["time"][1], replay["time"][1]);
 }
 
 TEST(HtmlData, WithoutASimulationThereIsTheHomePose) {
-  const BentPage page;
+  const PerturbedPage page;
   HtmlInput input = page.input();
   input.X_WB = nullptr;
   const Json replay = Json::parse(PageData(input))["replay"];
@@ -183,7 +183,7 @@ TEST(HtmlData, WithoutASimulationThereIsTheHomePose) {
 }
 
 TEST(HtmlData, NoNameEndsTheScript) {
-  BentPage page;
+  PerturbedPage page;
   page.report.scenario = "x</script><b>";
   const std::string data = PageData(page.input());
   EXPECT_EQ(data.find('<'), std::string::npos);
@@ -193,7 +193,7 @@ TEST(HtmlData, NoNameEndsTheScript) {
 }
 
 TEST(HtmlPage, RunsNoScriptButItsOwn) {
-  const BentPage page;
+  const PerturbedPage page;
   HtmlInput input = page.input();
   const std::string alone = ToHtml(input);
   EXPECT_NE(alone.find("script-src " + CspHash(PageScript()) + "\""), std::string::npos);
@@ -207,7 +207,7 @@ TEST(HtmlPage, RunsNoScriptButItsOwn) {
 }
 
 TEST(HtmlTables, FailedChecksComeFirst) {
-  const BentPage page;
+  const PerturbedPage page;
   const std::string html = ChecksHtml(ViewOf(page.report), "");
   const size_t fail = html.rfind("pill fail"), ok = html.find("pill ok");
   ASSERT_NE(fail, std::string::npos);
@@ -216,7 +216,7 @@ TEST(HtmlTables, FailedChecksComeFirst) {
 }
 
 TEST(HtmlPage, IsOneFileThatAsksForNothing) {
-  const BentPage page;
+  const PerturbedPage page;
   const std::string html = ToHtml(page.input());
   EXPECT_TRUE(html.starts_with("<!doctype html>"));
   EXPECT_NE(html.find("default-src 'none'"), std::string::npos);
@@ -243,7 +243,7 @@ TEST(StaticPlots, ThinningKeepsTheExtremesInTheirOrder) {
 }
 
 TEST(StaticPlots, ShowForcesAndTheirErrorsByUnit) {
-  BentPage page;
+  PerturbedPage page;
   const std::string html = StaticPlotsHtml(page.report);
   size_t figures = 0;
   for (size_t at = 0; (at = html.find("<figure>", at)) != std::string::npos; ++at) ++figures;

@@ -78,7 +78,7 @@ TEST(LoadFigures, OfAJointAreMagnitudesOfWholeVectors) {
   EXPECT_FALSE(j.not_unique);
 }
 
-TEST(LoadFigures, ABentSampleChangesThem) {
+TEST(LoadFigures, APerturbedSampleChangesThem) {
   const LoadFigures straight = LoadFiguresOf(LoadedReport());
   for (const char* channel : {"d1.force", "d1.velocity", "d1.position", "j.reaction.fz"}) {
     Report perturbed = LoadedReport();

@@ -13,26 +13,26 @@ namespace mbv {
 namespace {
 
 using synthetic::Case;
-using test::BentCase;
 using test::MakeReport;
+using test::PerturbedCase;
 
 TEST(Report, SummaryJsonIsAsWritten) {
-  const std::string json = ToJson(MakeReport(BentCase()));
+  const std::string json = ToJson(MakeReport(PerturbedCase()));
   ExpectGolden("summary.json", json);
 }
 
 TEST(Report, VerdictTableIsAsWritten) {
-  const std::string table = ToTable(MakeReport(BentCase()), {});
+  const std::string table = ToTable(MakeReport(PerturbedCase()), {});
   ExpectGolden("table.txt", table);
 }
 
 TEST(Report, VerboseTableIsAsWritten) {
-  const std::string table = ToTable(MakeReport(BentCase()), {.color = false, .verbose = true});
+  const std::string table = ToTable(MakeReport(PerturbedCase()), {.color = false, .verbose = true});
   ExpectGolden("table_verbose.txt", table);
 }
 
 TEST(Report, ColourAddsEscapesAndNothingElse) {
-  const Report report = MakeReport(BentCase());
+  const Report report = MakeReport(PerturbedCase());
   std::string colored = ToTable(report, {.color = true, .verbose = false});
   EXPECT_NE(colored.find("\x1b[1;31mDISAGREE\x1b[0m"), std::string::npos);
   for (size_t at; (at = colored.find('\x1b')) != std::string::npos;) {
@@ -42,7 +42,7 @@ TEST(Report, ColourAddsEscapesAndNothingElse) {
 }
 
 TEST(Report, JsonHasTheFieldsOthersRelyOn) {
-  const auto json = nlohmann::json::parse(ToJson(MakeReport(BentCase())));
+  const auto json = nlohmann::json::parse(ToJson(MakeReport(PerturbedCase())));
   for (const char* key : {"schema", "scenario", "mechanism", "verdict", "checks", "drives",
                           "metrics", "timing", "versions"}) {
     EXPECT_TRUE(json.contains(key)) << key;
@@ -65,7 +65,7 @@ TEST(Report, JsonHasTheFieldsOthersRelyOn) {
 }
 
 TEST(Report, JsonStatesWhoAgreesBesideWhoIsNamed) {
-  Report report = MakeReport(BentCase());
+  Report report = MakeReport(PerturbedCase());
   const auto without = nlohmann::json::parse(ToJson(report))["attribution"];
   EXPECT_FALSE(without.contains("agree"));
   report.comparison.attribution.split = Attribution::Split{.agree = {"reference", "analytic"},
@@ -87,7 +87,7 @@ TEST(Report, JsonStatesWhoAgreesBesideWhoIsNamed) {
 
 // The line of a disagreement quotes a check that fails, though the usual one passes.
 TEST(Report, TheVerdictLineQuotesNoNumberThatPasses) {
-  Report report = MakeReport(BentCase());
+  Report report = MakeReport(PerturbedCase());
   ResultView view = ViewOf(report);
   view.verdict = Verdict::kDisagree;
   view.main_pair = "simulated vs analytic";
@@ -127,7 +127,7 @@ TEST(Report, TheVerdictLineQuotesNoNumberThatPasses) {
 }
 
 TEST(Report, CsvHasDrivesFirstInTheOrderOfTheWitnesses) {
-  const std::string csv = ToCsv(MakeReport(BentCase()));
+  const std::string csv = ToCsv(MakeReport(PerturbedCase()));
   const std::string start =
       "time_s,d1.position.analytic,d1.velocity.analytic,d1.acceleration.analytic,d1.force.analytic,"
       "d1.position.simulated,d1.velocity.simulated,d1.acceleration.simulated,d1.force.simulated,"
@@ -140,7 +140,7 @@ TEST(Report, CsvHasDrivesFirstInTheOrderOfTheWitnesses) {
 }
 
 TEST(Report, CsvNumbersReadBackExactly) {
-  const Case c = BentCase();
+  const Case c = PerturbedCase();
   std::istringstream csv(ToCsv(MakeReport(c)));
   std::string line;
   for (int i = 0; i < 3; ++i) std::getline(csv, line);  // header, t = 0, t = 0.01
@@ -152,7 +152,7 @@ TEST(Report, CsvNumbersReadBackExactly) {
 
 // Where friction rests there is no number; the ends of the band stand beside it.
 TEST(Report, CsvGivesTheEndsOfABandAndNoMiddle) {
-  Report report = MakeReport(BentCase());
+  Report report = MakeReport(PerturbedCase());
   Trace& trace = report.witnesses[0].trace;
   trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));
   trace.values.conservativeResize(Eigen::NoChange, trace.values.cols() + 1);
@@ -169,7 +169,7 @@ TEST(Report, CsvGivesTheEndsOfABandAndNoMiddle) {
 }
 
 TEST(Report, SamplesAtRestAreTold) {
-  synthetic::Case c = BentCase();
+  synthetic::Case c = PerturbedCase();
   Trace& trace = c.simulated;
   trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));
   trace.values.conservativeResize(Eigen::NoChange, trace.values.cols() + 1);
@@ -184,7 +184,7 @@ TEST(Report, SamplesAtRestAreTold) {
 
 TEST(Report, CountsTellRanComparedAndVerifiedApart) {
   const Report agreed = MakeReport(Case());
-  const Report disagreed = MakeReport(BentCase());
+  const Report disagreed = MakeReport(PerturbedCase());
   Case alone;
   alone.reference_summary = alone.simulated_summary = {.message = "off", .where = {}, .unit = {}};
   const Report ran_only = MakeReport(alone);
@@ -195,13 +195,13 @@ TEST(Report, CountsTellRanComparedAndVerifiedApart) {
 
 TEST(Report, TheShortLineNamesVerdictValueAndLimit) {
   EXPECT_EQ(
-      VerdictLine(ViewOf(MakeReport(BentCase())), {}),
+      VerdictLine(ViewOf(MakeReport(PerturbedCase())), {}),
       "two_sliders / perturbed: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  3 of 18 "
       "checks exceed their limits\n");
 }
 
 TEST(Report, CsvOfAnySizeHasARowForEachSample) {
-  Report report = MakeReport(BentCase());
+  Report report = MakeReport(PerturbedCase());
   Trace& trace = report.witnesses[0].trace;
   trace.Reset(SampleTimes(50.0, 0.005), DriveChannels(synthetic::TwoSliders()));
   trace.witness = "analytic";

@@ -32,7 +32,7 @@ TEST(ParameterTable, KeepsTheDigitsThatAreStated) {
   EXPECT_THAT(table.rows[4], ElementsAre("I_x", "4.76e5", "kg m²", "corrected", ""));
 }
 
-TEST(ParameterTable, ABentValueIsNotWrittenAsStated) {
+TEST(ParameterTable, APerturbedValueIsNotWrittenAsStated) {
   std::vector<Parameter> parameters = FourParameters();
   parameters[0].value = 0.51;
   const Table table = ParameterTable(parameters, {{"q_min", {"0.500", "m", 0.5}}});
@@ -55,7 +55,7 @@ TEST(CheckTable, HasEveryCheckWithALimitAndHowItEnded) {
   EXPECT_GT(fails(differs), 0);
 }
 
-TEST(MobilityTable, TellsRanksAndWhatStaticsLeavesOpen) {
+TEST(MobilityTable, ReportsRanksAndWhatStaticsLeavesOpen) {
   MobilityReport report;
   report.home.constraint_rows = 22;
   report.home.constraint_rank = 21;

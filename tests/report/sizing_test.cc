@@ -52,9 +52,9 @@ std::string Joined(const std::vector<std::string>& lines) {
 TEST(Sizing, SamplesAtRestAreTold) {
   Report report = Sized("a", 3.2, 0.8);
   report.motor_loads[0].samples_at_rest = 1;
-  const std::string told = "friction rests at 1 of 2 samples: the worse end of the band counts";
-  EXPECT_NE(Joined(SizingLines(report, true)).find("  " + told + "\n"), std::string::npos);
-  EXPECT_NE(SizingHtml(report).find("d1: " + told + "."), std::string::npos);
+  const std::string reported = "friction rests at 1 of 2 samples: the worse end of the band counts";
+  EXPECT_NE(Joined(SizingLines(report, true)).find("  " + reported + "\n"), std::string::npos);
+  EXPECT_NE(SizingHtml(report).find("d1: " + reported + "."), std::string::npos);
   EXPECT_EQ(SizingJson(report)[0]["samples_at_rest"], 1);
 }
 
@@ -160,7 +160,7 @@ TEST(MotionTables, WithoutSmoothingTheySayWhatItWouldDo) {
   EXPECT_NE(ToText(MotionTableSection(report, false)).find("smoothing: auto would change it by"),
             std::string::npos);
   EXPECT_DOUBLE_EQ(report.tables[0].noise_share(), 9.0 / 16.0);
-  // What is next to nothing is told on demand.
+  // What is next to nothing is reported on demand.
   Report exact = WithTable("none");
   exact.tables[0].acceleration_change_rms = 1e-6;
   const auto lines = [&](bool verbose) {

@@ -124,7 +124,7 @@ TEST_F(MotionTableTest, RoundsAreRepeatedWithTheirTurns) {
 }
 
 // Noise of 1e-4 rad in rows 2 ms apart makes some 50 rad/s² of noise in the second derivative.
-TEST_F(MotionTableTest, NoiseIsToldAndTakenOut) {
+TEST_F(MotionTableTest, NoiseIsReportedAndTakenOut) {
   std::mt19937_64 random(20260722);
   std::normal_distribution<double> noise(0.0, 1e-4);
   WriteTable("a.csv", 501, 0.002, [&](double t) {
@@ -161,7 +161,7 @@ TEST_F(MotionTableTest, ExactTablesAreNotDoubted) {
   EXPECT_EQ(Messages("{table: {csv: a.csv, column: angle, rate: speed}}"), "");
 }
 
-TEST_F(MotionTableTest, WrongTablesAreToldWithPlaceAndHint) {
+TEST_F(MotionTableTest, WrongTablesAreReportedWithPlaceAndHint) {
   WriteTable("a.csv", 41, 0.025, Swing);
   WriteTable("round.csv", 40, 0.025, Round);
   folder_.Write("few.csv", "t,x\n0,1\n1,2\n2,3\n3,4\n");
@@ -215,7 +215,7 @@ TEST_F(MotionTableTest, WrongTablesAreToldWithPlaceAndHint) {
             "  hint: is it another column, or does it need sign or unit?\n");
 }
 
-TEST_F(MotionTableTest, WrongLawsAreToldWithPlaceAndHint) {
+TEST_F(MotionTableTest, WrongLawsAreReportedWithPlaceAndHint) {
   EXPECT_EQ(
       Messages("{s_curve: {delta: 1, v_max: 0, a_max_mm: 2, j_max: -1}}"),
       "s.yaml:5:40: error: motion.commands.motor.s_curve.v_max = 0 violates "

@@ -104,7 +104,7 @@ TEST_F(PoseTableTest, ComponentsMayBeLeftToOthers) {
       << text;
 }
 
-TEST_F(PoseTableTest, WrongFilesAreToldWithPlaceAndHint) {
+TEST_F(PoseTableTest, WrongFilesAreReportedWithPlaceAndHint) {
   WritePoses("q.csv", "qw,qx,qy,qz", [](const Mat3&) { return std::vector<double>{1, 1, 0, 0}; });
   WritePoses("up.csv", "rx,ry,rz", [](const Mat3&) { return std::vector<double>{0, 1.57, 0}; });
   EXPECT_EQ(Messages("{output: platform, csv: q.csv, angles: quaternion}"),

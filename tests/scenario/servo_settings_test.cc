@@ -54,7 +54,7 @@ TEST(ServoSettings, WrongGainsAreFindings) {
   EXPECT_TRUE(Says(Messages("{mode: forward, kp: 1}"), "of no use without mode: servo"));
 }
 
-TEST(ServoSettings, WhatDoesNotGoTogetherIsSaid) {
+TEST(ServoSettings, WhatDoesNotGoTogetherIsReported) {
   EXPECT_TRUE(Says(Messages("{mode: force_driven, engine: stock}"), "engine: corrected only"));
   const ScenarioResult free = LoadScenarioText(
       "mechanism: spring_cart\n"

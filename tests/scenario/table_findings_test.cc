@@ -209,7 +209,7 @@ TEST(TableFindings, ASettingThatIsNoneIsNamed) {
   EXPECT_TRUE(Has(LoadTable(csv, "{csv: t.csv, tolerance: {relative: -1}}").text, "violates >= 0"));
 }
 
-TEST(TableFindings, WhatIsNoTableSaysSo) {
+TEST(TableFindings, WhatIsNotATableSaysSo) {
   EXPECT_TRUE(Has(LoadTable("").text, "t.csv: error: holds no numbers"));
   EXPECT_TRUE(Has(LoadTable("just\nsome\nwords\n").text, "no table of numbers was found"));
   EXPECT_TRUE(Has(LoadTable(std::string("\xFF\xFE t", 4)).text, "is UTF-16 text"));

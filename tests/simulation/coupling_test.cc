@@ -70,7 +70,7 @@ TEST(SimulatedCoupling, ASumIsAFixedTendon) {
   }
 }
 
-TEST(SimulatedCoupling, WhatMuJoCoDoesNotKnowIsToldByName) {
+TEST(SimulatedCoupling, WhatMuJoCoDoesNotKnowIsReportedByName) {
   Mechanism m = CoupledWheels().Make();
   m.couplings[0].terms[0].polynomial = {-1.0, 0.1};
   const SimulationRun run = Simulate(m, FourSeconds(), Turning, {.mode = DriveMode::kInverse});

@@ -85,7 +85,7 @@ TEST(Engine, AnExplodingSpringIsAnEngineFailure) {
   EXPECT_EQ(run.summary.stop, Stop::kEngineFailure) << run.summary.message;
 }
 
-TEST(Engine, ADriveThatCannotBeReachedIsNoConvergence) {
+TEST(Engine, ADriveThatCannotBeReachedIsNotAConvergence) {
   // The crank of a four-bar that is a double rocker cannot turn to this angle.
   Mechanism m = fixtures::MakeFourBar();
   m.drives[0].kind = JointDrive{2, 0};  // drive the rocker instead

@@ -71,7 +71,7 @@ TEST(FastestRate, OfASpringIsTheSquareRootOfStiffnessOverMass) {
 }
 
 // The drift that a cart on a spring of 200 rad/s was measured to have in 6 s at 1 ms.
-TEST(FastestRate, TellsHowFarASpringDrifts) {
+TEST(FastestRate, ReportsHowFarASpringDrifts) {
   const FastestRate rate = RateOf(Cart(8e4, 0.0));
   EXPECT_NEAR(rate.drift * 1e-12, 1.9e-3, 1e-4);
   EXPECT_EQ(rate.drift_part, "spring 'spring'");

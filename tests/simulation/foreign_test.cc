@@ -211,7 +211,7 @@ bool Names(const std::set<std::string>& sources, const std::string& element,
     return std::ranges::any_of(
         sources, [&](const std::string& source) { return source.starts_with("actuator/"); });
   }
-  // One caveat tells of a tendon's limit, whichever kind the tendon is.
+  // One caveat reports of a tendon's limit, whichever kind the tendon is.
   if (element.starts_with("tendon/") && attribute != "armature") {
     return sources.contains("tendon/spatial " + (attribute == "limited" ? "range" : attribute));
   }
@@ -484,7 +484,7 @@ TEST(ForeignMjcf, BodiesThatNestTooDeeplyAreNamedSo) {
   EXPECT_EQ(text.find("XML_"), std::string::npos) << text;
 }
 
-// As files of MuJoCo 3 say them; MuJoCo 2.2 wants to be told that ranges hold.
+// As files of MuJoCo 3 say them; MuJoCo 2.2 wants to be reported that ranges hold.
 TEST(ForeignMjcf, RangesOfActuatorsHoldOfThemselves) {
   const Read read = ReadText(Arm({.tail = "<actuator><motor name='m' joint='A' ctrlrange='-1 1' "
                                           "forcerange='-2 2'/></actuator>"}));

@@ -1,5 +1,5 @@
 // Idle spins in the simulation: a rate of zero about each line, forces as with a universal joint,
-// and moments that would turn them told.
+// and moments that would turn them reported.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -49,7 +49,7 @@ Load TurnOfLeg3(const Mechanism& mechanism, double moment_Nm) {
   return load;
 }
 
-TEST(SimulatedIdleSpins, AMomentAboutALineIsToldInInverseMode) {
+TEST(SimulatedIdleSpins, AMomentAboutALineIsReportedInInverseMode) {
   SpinningLegs legs;
   legs.motion.loads.push_back(TurnOfLeg3(legs.mechanism, 1e-3));
   const SimulationRun run = legs.Run({.mode = DriveMode::kInverse});

@@ -87,7 +87,7 @@ Motion NetMotion(double from_deg, double to_deg) {
 
 // Of redundant rows those chosen at one pose may depend on each other at another, where the
 // mechanism itself is regular.
-TEST(ManyLoops, ARegularPoseOfANetIsNoLossOfControl) {
+TEST(ManyLoops, ARegularPoseOfANetIsNotALossOfControl) {
   for (const double home_deg : {20.0, 60.0, 90.0}) {
     const Mechanism net = Net(4, home_deg);
     const Mobility mobility = AnalyseMobility(net);

@@ -13,7 +13,7 @@ namespace mbv::test {
 
 /// Two sliders; the simulation 1 % off on d1 only; the reference was switched off; one check is
 /// off.
-inline synthetic::Case BentCase() {
+inline synthetic::Case PerturbedCase() {
   synthetic::Case c;
   c.column = LimitColumn::kForward;
   c.limits[Metric::kForceMax].forward.reset();
@@ -107,7 +107,7 @@ inline TableColumn Column(const std::string& channel, const std::string& heading
 /// A motion with everything that a page can show: caveats, an odd one out, a start-up window,
 /// checks of all ends, a table in the reference's place, energies, errors of engines, reactions.
 inline Report FullReport() {
-  Report report = MakeReport(BentCase());
+  Report report = MakeReport(PerturbedCase());
   report.scenario = "full";
   report.description = "Plates <b>&</b> \"sliders\"";
   report.start_window_s = 0.05;

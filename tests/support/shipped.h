@@ -1,4 +1,4 @@
-// What is shipped, found in the source tree: whoever adds a model need not tell the tests.
+// What is shipped, found in the source tree: whoever adds a model need not report the tests.
 #pragma once
 
 #include <algorithm>

@@ -39,7 +39,7 @@ double ValueOf(const Report& report, const std::string& check) {
   return found == nullptr ? kNan : found->value;
 }
 
-TEST(ForceDriven, TheMotionIsJudgedByWhereBentForcesLead) {
+TEST(ForceDriven, TheMotionIsJudgedByWherePerturbedForcesLead) {
   const RunOutcome outcome = RunOf("spr_tripod/force_driven", Short());
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
@@ -127,7 +127,7 @@ TEST(Servo, AStepThatCannotFollowTheGainsIsRefusedWithTheStepNeeded) {
       << outcome.report->comparison.reason;
 }
 
-TEST(StiffSpring, TheStepThatIsNeededIsSaidBeforeTheMotionIsOff) {
+TEST(StiffSpring, TheStepThatIsNeededIsReportedBeforeTheMotionIsOff) {
   std::vector<SetValue> set = {{"motion.duration_s", "0.5"}, {"snapshots.times_s", "[0]"}};
   set.emplace_back("parameters.k", "8e4");
   const RunOutcome coarse = RunOf("spring_cart/swing", set);
@@ -147,7 +147,7 @@ TEST(StiffSpring, TheStepThatIsNeededIsSaidBeforeTheMotionIsOff) {
 }
 
 // A block on a belt: by itself MuJoCo creeps where it sticks, whatever the step.
-TEST(EngineErrors, AFreeMotionTellsWhatMuJoCosOwnFrictionlossIsOff) {
+TEST(EngineErrors, AFreeMotionReportsWhatMuJoCosOwnFrictionlossIsOff) {
   const std::vector<std::pair<std::string, std::string>> plain = {
       {"parameters.F_s", "0.5"}, {"snapshots.times_s", "[]"}, {"motion.duration_s", "6"}};
   const RunOutcome outcome = RunOf("belt_block/stick_slip", plain);
@@ -164,7 +164,7 @@ TEST(EngineErrors, AFreeMotionTellsWhatMuJoCosOwnFrictionlossIsOff) {
   }
   const std::string text = stock.FrictionText();
   EXPECT_NE(text.find("no step that was tried brings it below"), std::string::npos) << text;
-  // A wide limit is met at once, and no smaller step is tried; breakaway is left out and told.
+  // A wide limit is met at once, and no smaller step is tried; breakaway is left out and reported.
   const RunOutcome wide = RunOf("belt_block/stick_slip", {{"motion.duration_s", "4"},
                                                           {"snapshots.times_s", "[]"},
                                                           {"checks.position_m", "0.5"},

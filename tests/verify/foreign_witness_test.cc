@@ -143,7 +143,7 @@ TEST(ForeignWitness, ThatStandsAloneIsNamed) {
 
 struct Mischief {
   const char* how;
-  const char* told;
+  const char* reported;
   WitnessGap gap;
   const char* limits = "";
 };
@@ -184,7 +184,7 @@ TEST_P(ForeignMischief, IsACaveatOfTheVerdict) {
   const WitnessRecord* record = RecordOf(outcome, "mock");
   ASSERT_NE(record, nullptr);
   EXPECT_EQ(record->summary.stop, Stop::kNotRun);
-  EXPECT_NE(record->summary.message.find(mischief.told), std::string::npos)
+  EXPECT_NE(record->summary.message.find(mischief.reported), std::string::npos)
       << record->summary.message;
   const PairComparison* pair = outcome.report->comparison.FindPair("mock_vs_reference");
   ASSERT_NE(pair, nullptr);
@@ -263,7 +263,7 @@ TEST(ForeignWitness, WithoutForcesIsACaveat) {
             Verdict::kNotRun);
 }
 
-TEST(ForeignWitness, ThatAnswersIsNoCaveat) {
+TEST(ForeignWitness, ThatAnswersIsNotACaveat) {
   const RunOutcome outcome = RunWith(Mock("answers", ", required: true"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kAgree);
@@ -332,12 +332,12 @@ TEST(AnalyticWitness, ThatIsNotApplicableIsACaveatAndMayBeRequired) {
 // Nothing that opens doors.
 TEST(ForeignWitness, GetsABareEnvironment) {
   const test::TestFolder folder("environment");
-  const std::string told = folder.PathOf("told");
+  const std::string reported = folder.PathOf("reported");
   setenv("SECRET_TOKEN", "1234", 1);
   setenv("LC_TIME", "C", 1);
   const RunOutcome outcome =
-      RunWith(fmt::format("{{mock: {{command: [python3, {}, tells, {}, {}]}}}}",
-                          SourcePath("/tests/verify/mock_witness.py"), kPlanar, told));
+      RunWith(fmt::format("{{mock: {{command: [python3, {}, reports, {}, {}]}}}}",
+                          SourcePath("/tests/verify/mock_witness.py"), kPlanar, reported));
   unsetenv("SECRET_TOKEN");
   unsetenv("LC_TIME");
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
@@ -349,7 +349,7 @@ TEST(ForeignWitness, GetsABareEnvironment) {
   std::set<std::string> added;
   std::istringstream bare(ReadWholeFile(base).value_or(""));
   for (std::string name; std::getline(bare, name);) added.insert(name);
-  std::istringstream names(ReadWholeFile(told).value_or(""));
+  std::istringstream names(ReadWholeFile(reported).value_or(""));
   bool path = false, time = false;
   for (std::string name; std::getline(names, name);) {
     path = path || name == "PATH";
@@ -397,7 +397,7 @@ TEST(ForeignWitness, SimbodyAgrees) {
 }
 
 // Free motions: springs, six free coordinates, a stiff loop that turns at thousands of rad/s. A
-// perturbed truth is told, and of three witnesses the odd one out is named.
+// perturbed truth is reported, and of three witnesses the odd one out is named.
 TEST(ForeignWitness, SimbodyMovesFreely) {
   const auto run = [](const char* scenario, const std::string& density) {
     RunOptions options;
@@ -473,9 +473,10 @@ class ProgramConsentTest : public testing::Test {
 
 TEST_F(ProgramConsentTest, NothingRunsUnasked) {
   EXPECT_FALSE(Runs(file_));
-  for (const char* told : {"case.yaml:5", "its programs may not run as you: there: ", "there.py",
-                           "no folder above it is trusted", "--trust", "mbverify trust "}) {
-    EXPECT_NE(text_.find(told), std::string::npos) << told << "\nin\n" << text_;
+  for (const char* reported :
+       {"case.yaml:5", "its programs may not run as you: there: ", "there.py",
+        "no folder above it is trusted", "--trust", "mbverify trust "}) {
+    EXPECT_NE(text_.find(reported), std::string::npos) << reported << "\nin\n" << text_;
   }
 }
 
@@ -587,11 +588,11 @@ TEST(ForeignWitness, BadSectionsAreRefused) {
       "{command: [x], limits: loose, timeout_s: -1}}");
   EXPECT_EQ(outcome.exit_code, 2);
   const std::string text = outcome.diagnostics.Text();
-  for (const char* told :
+  for (const char* reported :
        {"witnesses.simulated: this is the name of one of our own witnesses",
         "witnesses.a b: letters, digits and _ make a witness' name", "witnesses.c.command is empty",
         "unknown key 'comand'", "witnesses.e.limits", "witnesses.e.timeout_s = -1"}) {
-    EXPECT_NE(text.find(told), std::string::npos) << told << "\nin\n" << text;
+    EXPECT_NE(text.find(reported), std::string::npos) << reported << "\nin\n" << text;
   }
 }
 

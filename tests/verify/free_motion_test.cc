@@ -157,7 +157,7 @@ TEST(FreeMotionVerdicts, WhatChangesQuicklyIsFollowed) {
 }
 
 // Damping that grows until the step cannot follow it: what a quarter of the step does is tried.
-TEST(FreeMotionVerdicts, AStepThatIsTooLargeIsToldFromAMotionThatCannotBeFollowed) {
+TEST(FreeMotionVerdicts, AStepThatIsTooLargeIsReportedFromAMotionThatCannotBeFollowed) {
   const Comparison coarse = RunBar("-7*t*motor.velocity");
   EXPECT_EQ(coarse.verdict, Verdict::kNotRun) << TextOf(coarse);
   EXPECT_THAT(coarse.reason,

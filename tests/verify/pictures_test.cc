@@ -26,7 +26,7 @@ Report With(std::map<Metric, Measured> metrics) {
   return report;
 }
 
-TEST(Caption, TellsTheForceErrorOrElseThatOfTheMotion) {
+TEST(Caption, ReportsTheForceErrorOrElseThatOfTheMotion) {
   Measured force, place;
   force.value = 1.5e-9;
   place.value = 8.2e-12;

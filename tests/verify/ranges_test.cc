@@ -21,7 +21,7 @@ TEST(Ranges, TheWorstSampleOfEachDriveIsReported) {
   EXPECT_NEAR(summary.amount, 0.1, 1e-15);
 }
 
-TEST(Ranges, TouchingALimitIsNoViolation) {
+TEST(Ranges, TouchingALimitIsNotAViolation) {
   Mechanism mechanism = synthetic::TwoSliders();
   mechanism.drives[0].range = {-0.5, 0.5};
   EXPECT_TRUE(DriveViolations(mechanism, synthetic::ExactTrace("analytic")).empty());

@@ -15,7 +15,7 @@ const kFlags = [
 ];
 const kPatience_ms = 300000;  // for what must happen, on a busy machine
 
-const threads = new WeakMap();  // by page: the session that tells what its thread has computed
+const threads = new WeakMap();  // by page: the session that reports what its thread has computed
 
 async function launch() {
   const program = process.env.MBV_CHROMIUM;

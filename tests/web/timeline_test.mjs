@@ -25,7 +25,7 @@ beforeEach(() => {
   timeline.onChange((time) => seen.push(time));
 });
 
-test('A time is kept inside the run and told to every listener', () => {
+test('A time is kept inside the run and reported to every listener', () => {
   const also = [];
   timeline.onChange((time) => also.push(time));
   for (const time of [2, -7, 99]) timeline.set(time);

@@ -435,15 +435,4 @@ int RunUpgrade(const UpgradeArguments& arguments) {
   return WorseExit(exit_code, arguments.json.Write(ToJson(reports), {}));
 }
 
-// The command's former name; help does not show it.
-void AddUpgradeCommand(CLI::App* app, int* exit_code) {
-  auto arguments = std::make_shared<UpgradeArguments>();
-  CLI::App* upgrade = app->add_subcommand("upgrade", "crosscheck --newest");
-  upgrade->add_option("scenarios", arguments->scenarios, "scenario files or folders")->required();
-  upgrade->add_option("--program", arguments->program, "as of crosscheck");
-  arguments->json.AddTo(upgrade);
-  upgrade->add_option("--set", arguments->set, "as of crosscheck")->allow_extra_args(false);
-  upgrade->callback([arguments, exit_code] { *exit_code = RunUpgrade(*arguments); });
-}
-
 }  // namespace mbv

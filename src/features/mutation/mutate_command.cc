@@ -229,13 +229,11 @@ int Mutate(MutateArguments arguments) {
 
 }  // namespace
 
-namespace {
-
-CLI::App* AddCommand(const std::string& name, CLI::App* app, int* exit_code) {
+void AddSensitivityCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<MutateArguments>();
   arguments->jobs = AllCores();
   CLI::App* mutate = app->add_subcommand(
-      name,
+      "sensitivity",
       "Perturb each number of the simulated side and put structural faults into it: which errors "
       "would be noticed, and down to which size?");
   mutate->add_option("scenario", arguments->scenario, "scenario file that agrees")->required();
@@ -272,16 +270,6 @@ CLI::App* AddCommand(const std::string& name, CLI::App* app, int* exit_code) {
        "sensitivity scenarios/four_bar/turn_inverse.yaml --parameter rho --no-search"},
       "0 everything that matters is detected, 1 some is missed, 2 bad input, 3 could not run");
   mutate->callback([arguments, exit_code] { *exit_code = Mutate(*arguments); });
-  return mutate;
 }
-
-}  // namespace
-
-void AddSensitivityCommand(CLI::App* app, int* exit_code) {
-  AddCommand("sensitivity", app, exit_code);
-}
-
-// The command's former name; help does not show it.
-void AddMutateCommand(CLI::App* app, int* exit_code) { AddCommand("mutate", app, exit_code); }
 
 }  // namespace mbv

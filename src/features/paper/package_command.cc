@@ -22,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct PackageArguments {
+  bool check = false;
   std::vector<std::string> scenarios;
   std::string out = "paper.zip", date;
   bool no_report = false, no_figures = false, force = false, trust = false;
@@ -113,12 +114,12 @@ void AddPackageCommand(CLI::App* app, int* exit_code) {
   CLI::App* package = app->add_subcommand(
       "package", "An archive beside a paper: inputs, results, figures, and how to repeat them");
   CLI::Option* check =
-      package->add_option("--check", archive->archive,
-                          "repeat what this archive holds, and say which results are the same");
+      package->add_flag("--check", arguments->check,
+                        "repeat what an archive holds, and say which results are the same");
   package
       ->add_option("scenario", arguments->scenarios,
-                   "scenario files or folders of them, and study files")
-      ->excludes(check);
+                   "scenario files or folders of them, and study files; with --check the archive")
+      ->required();
   package->add_option("-o,--out", arguments->out, "the archive")
       ->capture_default_str()
       ->excludes(check);
@@ -141,13 +142,17 @@ void AddPackageCommand(CLI::App* app, int* exit_code) {
              "package --check paper.zip"},
             "0 agree, or the same within limits; 1 disagree (packed all the same), or something "
             "differs; 2 bad input, 3 could not run, 4 internal error");
-  package->callback([package, check, arguments, archive, exit_code] {
-    if (check->count() == 0 && arguments->scenarios.empty()) {
-      throw CLI::RequiredError("scenario, or --check");
+  package->callback([arguments, archive, exit_code] {
+    if (!arguments->check) {
+      *exit_code = Package(*arguments);
+    } else if (arguments->scenarios.size() != 1) {
+      *exit_code = Refuse("package --check takes one archive", "");
+    } else {
+      archive->archive = arguments->scenarios.front();
+      archive->trust = arguments->trust;
+      archive->json = arguments->json;
+      *exit_code = CheckArchive(*archive);
     }
-    archive->trust = arguments->trust;
-    archive->json = arguments->json;
-    *exit_code = check->count() > 0 ? CheckArchive(*archive) : Package(*arguments);
   });
 }
 

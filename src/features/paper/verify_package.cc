@@ -332,6 +332,13 @@ VerifyOutcome VerifyPackage(const std::string& file, const VerifyOptions& option
 // mbverify package --check
 
 int CheckArchive(const ArchiveArguments& arguments) {
+  // A scenario is what many give to a command that verifies.
+  const ScenarioHead head = ReadScenarioHead(arguments.archive);
+  if (head.is_scenario || head.HasKey("study")) {
+    return Refuse(
+        fmt::format("{} is not an archive", arguments.archive),
+        fmt::format("mbverify {} {}", head.is_scenario ? "run" : "study", arguments.archive));
+  }
   VerifyOptions options{.trust = arguments.trust};
   VerifyOutcome outcome;
   {
@@ -359,30 +366,6 @@ int CheckArchive(const ArchiveArguments& arguments) {
       ParseJson<nlohmann::ordered_json>(ToJson(outcome.report.value_or(none), outcome.exit_code));
   json["findings"] = FindingObjects(outcome.diagnostics);
   return WorseExit(outcome.exit_code, arguments.json.Write(json, {{arguments.archive, ""}}));
-}
-
-namespace {
-
-// A scenario is what many expect to give a program of this name.
-int VerifyWord(const ArchiveArguments& arguments) {
-  const ScenarioHead head = ReadScenarioHead(arguments.archive);
-  const char* command = head.is_scenario ? "run" : head.HasKey("study") ? "study" : nullptr;
-  if (command == nullptr) return CheckArchive(arguments);
-  return Refuse(fmt::format("{} is not an archive", arguments.archive),
-                fmt::format("mbverify {} {}", command, arguments.archive));
-}
-
-}  // namespace
-
-// The former name of package --check; help does not show it.
-void AddVerifyCommand(CLI::App* app, int* exit_code) {
-  auto arguments = std::make_shared<ArchiveArguments>();
-  CLI::App* verify = app->add_subcommand("verify", "package --check");
-  verify->add_option("archive", arguments->archive, "the archive")->required();
-  AddTrustOption(verify, &arguments->trust);
-  verify->add_flag("-v,--verbose", arguments->verbose, "as of package");
-  arguments->json.AddTo(verify);
-  verify->callback([arguments, exit_code] { *exit_code = VerifyWord(*arguments); });
 }
 
 }  // namespace mbv

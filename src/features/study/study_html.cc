@@ -236,11 +236,6 @@ std::string Panel(const ScatterMatrix& matrix, size_t column, size_t row) {
          "\n";
 }
 
-// As much of a name as the margin has room for.
-std::string Cut(const std::string& name, size_t most) {
-  return name.size() <= most ? name : "…" + name.substr(name.size() - most + 1);
-}
-
 }  // namespace
 
 std::string ToSvg(const ScatterMatrix& matrix) {
@@ -248,13 +243,13 @@ std::string ToSvg(const ScatterMatrix& matrix) {
   for (size_t c = 0; c < matrix.columns.size(); ++c) {
     const double middle = kNames + (kCell + kGap) * static_cast<double>(c) + kCell / 2.0;
     svg += SvgText({{"x", middle}, {"y", "16"}, {"text-anchor", "middle"}},
-                   Cut(matrix.columns[c], 18)) +
+                   ShortenedName(matrix.columns[c], 18)) +
            "\n";
   }
   for (size_t r = 0; r < matrix.rows.size(); ++r) {
     const double middle = kTopNames + (kCell + kGap) * static_cast<double>(r) + kCell / 2.0;
     svg += SvgText({{"x", kNames - 8}, {"y", middle}, {"text-anchor", "end"}},
-                   Cut(matrix.rows[r], 22)) +
+                   ShortenedName(matrix.rows[r], 22)) +
            "\n";
     for (size_t c = 0; c < matrix.columns.size(); ++c) svg += Panel(matrix, c, r);
   }

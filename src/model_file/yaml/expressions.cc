@@ -135,7 +135,7 @@ class Expression {
       return std::bit_cast<std::uint64_t>(entry.second) == std::bit_cast<std::uint64_t>(slot);
     };
     if (result_ && std::ranges::equal(values, slots_, same)) return *result_;
-    if (result_ && !parser_) MakeParser(values);
+    if (result_ && !parser_ && !refused_) MakeParser(values);
     slots_.clear();
     for (const auto& [name, value] : values) slots_.push_back(value);
     if (const std::optional<double> value = Again()) {
@@ -165,8 +165,11 @@ class Expression {
       const double* results = parser_->Eval(count);
       if (count == 1 && WhyNoNumber(results[0]).empty()) return results[0];
     } catch (const mu::ParserError&) {  // no std::exception
+      refused_ = true;
     } catch (const std::exception&) {
+      refused_ = true;
     }
+    if (refused_) parser_.reset();  // evaluated once more, it would run what it has of a program
     return {};
   }
 
@@ -176,6 +179,7 @@ class Expression {
   std::vector<double> slots_;  // values of the last result; of one length, so that they stay put
   std::optional<ExpressionResult> result_;
   std::unique_ptr<mu::Parser> parser_;
+  bool refused_ = false;  // by the parser: it takes the text with no numbers
 };
 
 std::shared_ptr<Expression> ExpressionOf(const std::string& text) {

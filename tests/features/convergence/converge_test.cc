@@ -30,7 +30,7 @@ TEST(Converge, OnTheSliderCrankEachSchemeShowsItsOrder) {
        {"corrected_both", "corrected_step", "stock_both", "stock_step", "stock_time_constant"}) {
     EXPECT_TRUE(FindSeries(outcome, name).verdict.judged) << name;
   }
-  // Half an order apart from the neighbours is what tells them apart.
+  // Half an order apart from the neighbours is what reports them apart.
   EXPECT_NEAR(FindSeries(outcome, "corrected_both").fit.order, 4.0, kOrderTolerance);
   EXPECT_NEAR(FindSeries(outcome, "stock_step").fit.order, 1.0, kOrderTolerance);
   EXPECT_NEAR(FindSeries(outcome, "stock_time_constant").fit.order, 2.0, kOrderTolerance);

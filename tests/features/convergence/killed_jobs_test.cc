@@ -1,4 +1,4 @@
-// Processes that share work and are killed: what is lost is told, and the rest is no good end.
+// Processes that share work and are killed: what is lost is reported, and the rest is no good end.
 #include <gtest/gtest.h>
 #include <sys/types.h>
 

@@ -54,7 +54,7 @@ TEST(OrderFit, ToleratesHalfAnOrderAndNotMore) {
   EXPECT_TRUE(verdict(2.0 + 2.0 * kOrderTolerance).finding);
 }
 
-TEST(OrderFit, ARoundoffPlateauIsLeftOutAndIsNoFinding) {
+TEST(OrderFit, ARoundoffPlateauIsLeftOutAndIsNotAFinding) {
   // Order 4 from 1e-8 down to a plateau at 2e-11.
   const OrderFit fit = Fit({1e-8, 6.3e-10, 4.5e-11, 2.1e-11, 2.0e-11});
   EXPECT_EQ(fit.floor, (std::vector<bool>{false, false, true, true, true}));

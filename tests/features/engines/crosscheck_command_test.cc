@@ -45,7 +45,7 @@ TEST(CrosscheckCommand, FindsFilesWhereItIsCalled) {
   EXPECT_NE(result.out.find("planar (planar.py 1)"), std::string::npos) << result.out;
 }
 
-TEST(CrosscheckCommand, RefusesWhatIsNoEngineAndItsOwnInputs) {
+TEST(CrosscheckCommand, RefusesWhatIsNotAnEngineAndItsOwnInputs) {
   const Program mbverify("crosscheck_bad");
   EXPECT_EQ(mbverify("crosscheck " + kTurn + " --engine planar").exit_code, 2);
   EXPECT_EQ(mbverify("crosscheck " + kTurn + " --engine 'reference=x'").exit_code, 2);

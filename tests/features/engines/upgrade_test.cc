@@ -44,7 +44,7 @@ TEST(UpgradeReport, IsReadByPeople) {
       "  recipe                         3.0e-04       –      1.0e-05 m    –  diverged\n");
 }
 
-TEST(UpgradeReport, TellsWhatIsSaidAndThatNobodyAnswered) {
+TEST(UpgradeReport, ReportsWhatIsReportedAndThatNobodyAnswered) {
   UpgradeReport report = ExampleUpgrade();
   report.messages = {"a word"};
   EXPECT_NE(ToText(report).find("  says while loading:\n    a word\n"), std::string::npos);

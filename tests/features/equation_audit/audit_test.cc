@@ -42,7 +42,7 @@ TEST(AuditVerdict, NeverPassesNaN) {
   EXPECT_EQ(VerdictOf(row), AuditVerdict::kWrongAndUnfixed);
 }
 
-TEST(AuditVerdict, TellsAnApproximationFromAnErrorByHowNearItIs) {
+TEST(AuditVerdict, ReportsAnApproximationFromAnErrorByHowNearItIs) {
   AuditRow row = Row();
   row.approximation = 2e-2;
   EXPECT_EQ(VerdictOf(row), AuditVerdict::kApproximation);

@@ -53,7 +53,7 @@ TEST(StiffnessTruth, AClampedBeamIsThatOfTheTextbook) {
   EXPECT_NEAR(K(2, 4), -6 * EI_z / (L * L), 1e-9 * K(4, 4));
 }
 
-TEST(StiffnessTruth, ABentBeamIsAnotherOne) {
+TEST(StiffnessTruth, APerturbedBeamIsAnotherOne) {
   const Mat6 right = stiffness_audit::CantileverStiffness(TextbookBeam(), 0.75);
   using S = Section;
   for (double S::*member : {&S::area, &S::I_y, &S::I_z, &S::torsion}) {

@@ -36,7 +36,7 @@ TEST(CabinAudit, EveryCorrectedFormIsConfirmed) {
   }
 }
 
-TEST(CabinAudit, BentLengthsLeaveEquationsUnconfirmed) {
+TEST(CabinAudit, PerturbedLengthsLeaveEquationsUnconfirmed) {
   const Lengths truth = cabin_audit::LengthsOf(Robot());
   const auto unconfirmed = [&](double Lengths::*length) {
     Lengths perturbed = truth;
@@ -69,7 +69,7 @@ TEST(CabinAudit, BentLengthsLeaveEquationsUnconfirmed) {
   }
 }
 
-TEST(CabinAudit, ABentMassLeavesTheDynamicsUnconfirmed) {
+TEST(CabinAudit, APerturbedMassLeavesTheDynamicsUnconfirmed) {
   Mechanism perturbed = Robot();
   for (Parameter& p : perturbed.parameters) {
     if (p.name == "m_AB") p.value *= kBend;

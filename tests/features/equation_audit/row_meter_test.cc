@@ -38,8 +38,8 @@ TEST(RowMeter, OneFormIsPrintAndCorrection) {
   EXPECT_EQ(row.verdict, AuditVerdict::kOk);
 }
 
-// Bent by twice the limit at one state of many.
-TEST(RowMeter, OneBentStateIsEnough) {
+// Perturbed by twice the limit at one state of many.
+TEST(RowMeter, OnePerturbedStateIsEnough) {
   for (const int perturbed : {0, 5, 9}) {
     RowMeter meter = Meter();
     for (int state = 0; state < 10; ++state) {
@@ -50,7 +50,7 @@ TEST(RowMeter, OneBentStateIsEnough) {
   }
 }
 
-TEST(RowMeter, WhatIsNoNumberStays) {
+TEST(RowMeter, WhatIsNotANumberStays) {
   for (const int state : {0, 1, 2}) {
     RowMeter meter = Meter();
     for (int k = 0; k < 3; ++k) meter.Add(1.0, 1.0, k == state ? kNan : 1.0);

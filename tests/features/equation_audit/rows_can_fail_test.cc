@@ -42,7 +42,7 @@ class Noticed {
       if (row.verdict != AuditVerdict::kNotTestable) blind_.insert(row.equation);
     }
   }
-  void Bent(const Rows& rows) {
+  void Perturbed(const Rows& rows) {
     for (const AuditRow& row : rows) {
       if (row.verdict == AuditVerdict::kWrongAndUnfixed) blind_.erase(row.equation);
     }
@@ -70,7 +70,7 @@ TEST(AuditRows, OfTheScaraRobotCanFail) {
                             &P::m_arm, &P::arm_radius, &P::arm_com, &P::m_rods, &P::rod_radius}) {
     P perturbed = right;
     perturbed.*member *= kBendOfAll;
-    noticed.Bent(rows(perturbed, sweep));
+    noticed.Perturbed(rows(perturbed, sweep));
   }
   using State = scara_audit::State;
   const std::vector<std::function<void(State*)>> bends = {
@@ -97,7 +97,7 @@ TEST(AuditRows, OfTheScaraRobotCanFail) {
   for (const auto& bend : bends) {
     auto states = sweep;
     bend(&states[5]);
-    noticed.Bent(rows(right, states));
+    noticed.Perturbed(rows(right, states));
   }
   // The topology, printed data and figures; (33) and (49) hold for any constants.
   EXPECT_EQ(noticed.blind(), (std::set<std::string>{"(1)", "(33)", "(49)", "F = Σf − Σξ", "Fig. 8",
@@ -115,13 +115,13 @@ TEST(AuditRows, OfTheScaraRobotsStiffnessCanFail) {
   for (double P::*member : {&P::d, &P::E, &P::G, &P::diameter, &P::K_act}) {
     P perturbed = right;
     perturbed.*member *= kBendOfAll;
-    noticed.Bent(rows(perturbed));
+    noticed.Perturbed(rows(perturbed));
   }
   for (double scara::Parameters::*member : {&scara::Parameters::l1, &scara::Parameters::l2,
                                             &scara::Parameters::r, &scara::Parameters::e}) {
     P perturbed = right;
     perturbed.geometry.*member *= kBendOfAll;
-    noticed.Bent(rows(perturbed));
+    noticed.Perturbed(rows(perturbed));
   }
   EXPECT_EQ(noticed.blind(), std::set<std::string>{});
 }
@@ -141,9 +141,9 @@ TEST(AuditRows, OfTheCabinRobotCanFail) {
         &Lengths::a3, &Lengths::a4, &Lengths::d6}) {
     Lengths perturbed = truth;
     perturbed.*length += 1e-6;
-    noticed.Bent(All({cabin_audit::PositionRows(perturbed, truth),
-                      cabin_audit::VelocityRows(perturbed, truth),
-                      cabin_audit::WristRows(perturbed, truth)}));
+    noticed.Perturbed(All({cabin_audit::PositionRows(perturbed, truth),
+                           cabin_audit::VelocityRows(perturbed, truth),
+                           cabin_audit::WristRows(perturbed, truth)}));
   }
   for (const Parameter& parameter : robot.parameters) {
     if (!parameter.name.starts_with("m_") && !parameter.name.starts_with("I_")) continue;
@@ -151,7 +151,7 @@ TEST(AuditRows, OfTheCabinRobotCanFail) {
     for (Parameter& p : perturbed.parameters) {
       if (p.name == parameter.name) p.value *= kBendOfAll;
     }
-    noticed.Bent(cabin_audit::DynamicsRows(perturbed, robot));
+    noticed.Perturbed(cabin_audit::DynamicsRows(perturbed, robot));
   }
   // Orientations and rates by angles alone: they are compared with differences of the linkage that
   // Newton closes, whatever its lengths (PlanarTruth).
@@ -184,7 +184,7 @@ TEST(AuditRows, OfTheCabinRobotsStiffnessCanFail) {
   for (const auto& bend : bends) {
     cabin::StiffnessParameters perturbed = right;
     bend(&perturbed);
-    noticed.Bent(rows(perturbed));
+    noticed.Perturbed(rows(perturbed));
   }
   EXPECT_EQ(noticed.blind(), std::set<std::string>{"(55)"});  // equilibrium by angles
 }
@@ -220,7 +220,7 @@ TEST(AuditRows, OfTheTripodCanFail) {
   for (const auto& bend : bends) {
     Case perturbed = right;
     bend(&perturbed);
-    noticed.Bent(rows(perturbed));
+    noticed.Perturbed(rows(perturbed));
   }
   // The path law, the example's data, and identities in the angles.
   EXPECT_EQ(noticed.blind(),
@@ -239,7 +239,7 @@ TEST(AuditRows, OfTheStabilizingPlatformCanFail) {
     Case bent_full = full, bent_massless = massless;
     change(&bent_full.truth[7]);
     change(&bent_massless.truth[7]);
-    noticed.Bent(rows(bent_full, bent_massless));
+    noticed.Perturbed(rows(bent_full, bent_massless));
   };
   bend([](Truth* t) { t->X_eo.translation() *= kBendOfAll; });
   bend([](Truth* t) { t->X_ep.translation() *= kBendOfAll; });

@@ -73,7 +73,7 @@ TEST(ScaraAudit, EveryErratumIsLargeComparedWithItsLimit) {
   }
 }
 
-TEST(ScaraAudit, BentConstantsLeaveEquationsUnconfirmed) {
+TEST(ScaraAudit, PerturbedConstantsLeaveEquationsUnconfirmed) {
   const LoadResult model = LoadModel(std::string(kModelFolder) + "/scara_robot/model.yaml");
   ASSERT_TRUE(model.mechanism) << model.diagnostics.Text();
   const std::vector<scara_audit::State> states = scara_audit::Sweep(*model.mechanism);

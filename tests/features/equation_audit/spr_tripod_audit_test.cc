@@ -73,7 +73,7 @@ TEST(SprTripodAudit, PrintedPositionsHoldInAFrameTurnedBy150Degrees) {
   }
 }
 
-TEST(SprTripodAudit, ABentEquationIsFoundOut) {
+TEST(SprTripodAudit, APerturbedEquationIsFoundOut) {
   // The limits are close enough to see a dimension that is 1e-9 m wrong.
   spr_tripod_audit::Case c = spr_tripod_audit::MakeCase(SourcePath("/models"));
   c.geometry.a += 1e-9;

@@ -71,7 +71,7 @@ TEST(StabilizingPlatformAudit, FindsTheErrorsOfThePrintInTheirKnownSize) {
   }
 }
 
-TEST(StabilizingPlatformAudit, NoticesEquationsBentByTwiceTheirLimit) {
+TEST(StabilizingPlatformAudit, NoticesEquationsPerturbedByTwiceTheirLimit) {
   const Case right = MakeCase(kModels, 1.0);
   auto bent_case = [&](double sp::PlatformParameters::*parameter, double change) {
     Case perturbed = right;

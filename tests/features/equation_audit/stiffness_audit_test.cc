@@ -43,7 +43,7 @@ TEST(StiffnessAudit, CabinsEquationsAreRightOrMended) {
   EXPECT_TRUE(With(rows, AuditVerdict::kWrongAndUnfixed).empty());
 }
 
-TEST(StiffnessAudit, CabinsBentConstantsLeaveEquationsUnconfirmed) {
+TEST(StiffnessAudit, CabinsPerturbedConstantsLeaveEquationsUnconfirmed) {
   const auto unconfirmed = [](const auto& bend) {
     cabin::StiffnessParameters p = Cabin();
     bend(&p);
@@ -62,7 +62,7 @@ TEST(StiffnessAudit, CabinsBentConstantsLeaveEquationsUnconfirmed) {
   EXPECT_TRUE(unconfirmed([](auto* p) { p->E *= kBend; }).contains("(54)"));
 }
 
-TEST(StiffnessAudit, ScarasBentConstantsLeaveEquationsUnconfirmed) {
+TEST(StiffnessAudit, ScarasPerturbedConstantsLeaveEquationsUnconfirmed) {
   const auto unconfirmed = [](double scara::StiffnessParameters::*member) {
     scara::StiffnessParameters p = Scara();
     p.*member *= 1 + 1e-8;

@@ -75,7 +75,7 @@ class SourceModelAudits : public testing::Test {
     for (const SourceModelCause* cause : audit.Culprits()) keys.push_back(cause->key);
     return keys.empty() ? Keys{""} : keys;
   }
-  static bool Said(const std::vector<std::string>& lines, const std::string& text) {
+  static bool Reported(const std::vector<std::string>& lines, const std::string& text) {
     for (const std::string& line : lines) {
       if (line.find(text) != std::string::npos) return true;
     }
@@ -86,7 +86,7 @@ class SourceModelAudits : public testing::Test {
                                  testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
-TEST_F(SourceModelAudits, InWhichNothingIsWrongIsToldSo) {
+TEST_F(SourceModelAudits, InWhichNothingIsWrongIsReportedSo) {
   const SourceModelAudit audit =
       Audit(Text({.head = std::string("<option timestep='0.0005' integrator='RK4'/>") + kStiff}));
   ASSERT_TRUE(audit.declined.empty()) << audit.declined;
@@ -149,7 +149,7 @@ TEST_F(SourceModelAudits, ServosThatLagAreNamedAndNoSettingIsBlamed) {
       {.head = kStiff,
        .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"}));
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
-  EXPECT_TRUE(Said(audit.done, "m: led by the file's own position servos"));
+  EXPECT_TRUE(Reported(audit.done, "m: led by the file's own position servos"));
   EXPECT_GT(audit.as_is.force, 0.01);
   EXPECT_EQ(Named(audit), Keys{"drives"});
   EXPECT_FALSE(audit.searched);
@@ -161,10 +161,10 @@ TEST_F(SourceModelAudits, WhatCutsAServosCommandOrForceIsTold) {
     return Text({.head = kStiff,
                  .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", range)});
   };
-  EXPECT_TRUE(Said(Audit(servo("ctrllimited='true' ctrlrange='-0.05 0.05'")).notes,
-                   "ctrlrange cuts its command, first at 0."));
-  EXPECT_TRUE(Said(Audit(servo("forcelimited='true' forcerange='-0.5 0.5'")).notes,
-                   "as its forcerange allows, first at 0"));
+  EXPECT_TRUE(Reported(Audit(servo("ctrllimited='true' ctrlrange='-0.05 0.05'")).notes,
+                       "ctrlrange cuts its command, first at 0."));
+  EXPECT_TRUE(Reported(Audit(servo("forcelimited='true' forcerange='-0.5 0.5'")).notes,
+                       "as its forcerange allows, first at 0"));
   EXPECT_TRUE(Audit(servo("")).notes.empty());
 }
 
@@ -175,8 +175,8 @@ TEST_F(SourceModelAudits, ADampedServoKeepsItsDamping) {
                  .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", kv)});
   };
   const SourceModelAudit damped = Audit(servo("kv='40'")), plain = Audit(servo(""));
-  EXPECT_TRUE(Said(damped.done, "kv is taken over"));
-  EXPECT_FALSE(Said(plain.done, "kv is taken over"));
+  EXPECT_TRUE(Reported(damped.done, "kv is taken over"));
+  EXPECT_FALSE(Reported(plain.done, "kv is taken over"));
   // A servo that brakes lags more.
   EXPECT_GT(damped.as_is.force, 2.0 * plain.as_is.force);
 }
@@ -187,12 +187,12 @@ TEST_F(SourceModelAudits, AnEqualityThatHoldsTheDriveLeadsIt) {
   bars.closure += holds;
   const SourceModelAudit audit = Audit(Text(bars));
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
-  EXPECT_TRUE(Said(audit.done, "m: led by the file's own equality"));
+  EXPECT_TRUE(Reported(audit.done, "m: led by the file's own equality"));
   EXPECT_NE(Find(audit, "drives"), nullptr);
   EXPECT_LT(audit.corrected.force, 1e-3);
 }
 
-TEST_F(SourceModelAudits, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
+TEST_F(SourceModelAudits, WhatTheReferenceDoesNotHaveIsNotAFaultOfTheFile) {
   const SourceModelAudit audit =
       Audit(Text({.head = std::string("<option density='2000'/>") + kStiff}));
   EXPECT_EQ(Named(audit), Keys{"left_out"});
@@ -222,7 +222,7 @@ TEST_F(SourceModelAudits, AFreeBaseIsHeldAsIfItWereFixed) {
   const SourceModelAudit fixed = Audit(Text({.head = kStiff}));
   const SourceModelAudit free = Audit(Text({.head = kStiff, .base = "<freejoint/>"}));
   ASSERT_TRUE(free.as_is.sound()) << free.as_is.failure;
-  EXPECT_TRUE(Said(free.done, "free bodies are held where they are"));
+  EXPECT_TRUE(Reported(free.done, "free bodies are held where they are"));
   EXPECT_NEAR(free.as_is.force, fixed.as_is.force, 1e-2 * fixed.as_is.force);
   EXPECT_LT(free.corrected.force, 1e-3);
 }
@@ -249,7 +249,7 @@ TEST_F(SourceModelAudits, AWeldThatTwistsIsMeasured) {
   EXPECT_LT(tight.as_is.joint_force, 1e-2);
 }
 
-// Another mass is no matter of settings: it stays when all is corrected, and is told.
+// Another mass is no matter of settings: it stays when all is corrected, and is reported.
 TEST_F(SourceModelAudits, AFileOfAnotherMechanismIsNotBlamedOnItsSettings) {
   const std::string right = Text({.head = kStiff});
   const SourceModelAudit audit = Audit(right, Text({.head = kStiff, .coupler_kg = 1.05}));
@@ -271,7 +271,7 @@ TEST_F(SourceModelAudits, ThatDivergesGivesATimeAndNoNumbers) {
       << SourceModelSentence(audit);
 }
 
-TEST_F(SourceModelAudits, FrictionOfContactsIsNoMatterHere) {
+TEST_F(SourceModelAudits, FrictionOfContactsIsNotAMatterHere) {
   const SourceModelAudit audit = Audit(Text({.head = kSoft}));
   bool found = false;
   for (const SourceModelTrial& trial : audit.trials) {

@@ -183,7 +183,7 @@ TEST(Mutate, AFinerResolutionNarrowsTheSearch) {
   EXPECT_EQ(report.mutations[0].own.best_check, "simulated_vs_reference.force_nrmse");
 }
 
-TEST(Mutate, ParametersThatAreZeroAreBentByAShareOfTheirLike) {
+TEST(Mutate, ParametersThatAreZeroArePerturbedByAShareOfTheirLike) {
   const MutationReport report = Mutate(
       "spr_tripod/default_inverse", {.size = 1e-3, .numbers = {"phi_3", "m_rod"}, .progress = {}});
   const Mutation* zero = FindMutation(report, "phi_3");
@@ -328,7 +328,7 @@ TEST(Mutate, PartsOfWorkersMakeTheWhole) {
   EXPECT_EQ(ToJson(merged), ToJson(whole));
 }
 
-TEST(Mutate, AForwardScenarioIsBentInItsOwnModeAndLimitsAndInInverseMode) {
+TEST(Mutate, AForwardScenarioIsPerturbedInItsOwnModeAndLimitsAndInInverseMode) {
   MutationOptions options{.size = 1e-3, .numbers = {"rho"}, .progress = {}};
   const MutationReport report = Mutate("four_bar/turn", options);
   EXPECT_EQ(report.mode, "forward");
@@ -349,7 +349,7 @@ TEST(Mutate, AForwardScenarioIsBentInItsOwnModeAndLimitsAndInInverseMode) {
 
 // Pushed by the right forces a wrong mass goes elsewhere; servos need other forces on the way that
 // they went. Held on its motion neither would be what the scenario does.
-TEST(Mutate, PushedAndServoDrivesAreBentAsTheyAreDriven) {
+TEST(Mutate, PushedAndServoDrivesArePerturbedAsTheyAreDriven) {
   MutationOptions options = WithFaults();
   options.numbers = {"m_platform"};
   for (const MutationModes modes : {MutationModes::kBoth, MutationModes::kOwn}) {
@@ -385,7 +385,7 @@ TEST(Mutate, ForwardPickAndPlaceSeesWhatInverseModeSees) {
   }
 }
 
-TEST(Mutate, NumbersOfInstancesAndNumbersWrittenInPlaceAreBent) {
+TEST(Mutate, NumbersOfInstancesAndNumbersWrittenInPlaceArePerturbed) {
   const MutationReport report = Mutate("stewart/wave", Plain());
   EXPECT_EQ(report.exit_code, 0) << ToText(report, false);
   for (const auto& [name, kind] :
@@ -419,7 +419,7 @@ TEST(Mutate, ErrorsOfBothSignsMustBeSeen) {
   EXPECT_FALSE(seen.detected);
 }
 
-TEST(Mutate, AScenarioThatDisagreesIsNotBent) {
+TEST(Mutate, AScenarioThatDisagreesIsNotPerturbed) {
   const MutationReport report = Mutate("spr_tripod/must_fail/analytic_mass");
   EXPECT_EQ(report.exit_code, 1);
   EXPECT_TRUE(report.mutations.empty());

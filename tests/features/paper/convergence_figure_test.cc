@@ -60,7 +60,7 @@ TEST(ConvergenceFigures, HaveEveryErrorAndLinesOfTheFittedSlope) {
   EXPECT_DOUBLE_EQ(constant.curves[0].points[0].first, 0.2);
 }
 
-TEST(ConvergenceFigures, ABentErrorMovesItsPointAndTheSlope) {
+TEST(ConvergenceFigures, APerturbedErrorMovesItsPointAndTheSlope) {
   ConvergenceReport report = AConvergence(4.0);
   report.series[0].points[2].error.smooth *= 1.5;
   Judge(SampleClasses({0.0, 1.0, 2.0}, {}, 0.05), &report.series[0]);

@@ -60,7 +60,7 @@ TEST(DefaultFigures, DrivesWithASymbolAreCalledByIt) {
   EXPECT_EQ(Named(set, "force_speed").panels[0].curves[1].label, "d2");
 }
 
-TEST(DefaultFigures, OneBentSampleShowsInTheDifferences) {
+TEST(DefaultFigures, OnePerturbedSampleShowsInTheDifferences) {
   synthetic::Case c;
   c.simulated.values(40, c.simulated.Find("d2.force")) += 0.25;
   const FigureSet set = DefaultFigures(test::SampledReport(c), Language::kEnglish);
@@ -81,7 +81,7 @@ TEST(DefaultFigures, OneBentSampleShowsInTheDifferences) {
   EXPECT_THAT(pairs, ElementsAre("simulation − analytic", "simulation − reference"));
 }
 
-TEST(DefaultFigures, WithoutDifferencesTheyAreLeftOutAndThisIsSaid) {
+TEST(DefaultFigures, WithoutDifferencesTheyAreLeftOutAndThisIsReported) {
   const FigureSet set = DefaultFigures(test::SampledReport(), Language::kEnglish);
   EXPECT_EQ(Named(set, "drive_forces").panels.size(), 1u);
   EXPECT_THAT(set.left_out, testing::Contains(HasSubstr("no difference to show")));

@@ -199,7 +199,7 @@ TEST(OwnFigures, AreDrawnBesideTheUsualOnesAndReplaceThoseOfTheirName) {
   }
 }
 
-TEST(OwnFigures, MistakesOfFormAreAllToldWithTheirPlaces) {
+TEST(OwnFigures, MistakesOfFormAreAllReportedWithTheirPlaces) {
   EXPECT_EQ(FindingsOf("  - {signals: motor.force}\n"
                        "  - {name: ../up, signals: []}\n"
                        "  - {name: a, panels: [{signals: motor.force, colour: red}], x: q}\n"
@@ -218,7 +218,7 @@ t.yaml:12:55: error: figures[3].log = 'maybe' is neither true nor false
 )");
 }
 
-TEST(OwnFigures, NamesAndUnitsThatDoNotFitAreAllToldWithTheirPlaces) {
+TEST(OwnFigures, NamesAndUnitsThatDoNotFitAreAllReportedWithTheirPlaces) {
   EXPECT_EQ(
       FindingsOf("  - {name: a, signals: motor.forse}\n"
                  "  - {name: b, signals: [motor.force, motor.position]}\n"

@@ -1,5 +1,5 @@
 // The commands package and verify: an archive runs wherever it is unpacked, and whatever somebody
-// changes in it is told.
+// changes in it is reported.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -192,7 +192,7 @@ TEST(PackageCommand, PagesThatAuditAPapersEquationsArePackedToo) {
   EXPECT_TRUE(Has(verified.out, "0 not judged, 0 differ: repeated")) << verified.out;
 }
 
-TEST(VerifyCommand, ABentNumberIsToldWithItsSignal) {
+TEST(VerifyCommand, APerturbedNumberIsReportedWithItsSignal) {
   const Packed packed = FourBar("perturbed");
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
   const ProgramResult perturbed =
@@ -234,7 +234,7 @@ TEST(VerifyCommand, ChangedInputsGiveOtherResults) {
   EXPECT_TRUE(Has(longer.out, "rows in the archive")) << longer.out;
 }
 
-TEST(VerifyCommand, WhatIsNoArchiveOfOursIsRefusedUnrun) {
+TEST(VerifyCommand, WhatIsNotAnArchiveOfOursIsRefusedUnrun) {
   const Packed packed = FourBar("hostile");
   const std::pair<const char*, const char*> edits[] = {
       {"drop RESULTS/traces.csv", "lacks 'results/four_bar/turn_inverse/traces.csv'"},
@@ -297,7 +297,7 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024, result.ret
   }
 }
 
-TEST(VerifyCommand, AnotherVersionIsSaid) {
+TEST(VerifyCommand, AnotherVersionIsReported) {
   const Packed packed = FourBar("version");
   const ProgramResult other =
       packed.Edited("replace manifest.json '\"mbverify\": \"' '\"mbverify\": \"9.'", "--json -");

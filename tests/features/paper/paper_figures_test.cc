@@ -93,7 +93,7 @@ TEST(PaperFigures, Table2HoldsTheDigitsOfThePrintAndCountsItsDeviations) {
   EXPECT_THAT(PaperPage({outcome}), HasSubstr(result.table));
 }
 
-TEST(PaperFigures, WhatDoesNotExistIsToldAndNothingIsDrawn) {
+TEST(PaperFigures, WhatDoesNotExistIsReportedAndNothingIsDrawn) {
   const PaperFile paper = PaperOf("scara_robot");
   PaperOutcome outcome = MakePaperFigures("scara_robot", paper, AsSvg({"fig13"}));
   EXPECT_EQ(outcome.exit_code, 2);

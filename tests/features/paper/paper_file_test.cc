@@ -54,7 +54,7 @@ TEST(PaperFile, IsReadWhole) {
   EXPECT_EQ(paper->left_out.at(0).second, "a sketch");
 }
 
-TEST(PaperFile, BadInputIsToldWithItsPlace) {
+TEST(PaperFile, BadInputIsReportedWithItsPlace) {
   EXPECT_THAT(PaperFindings("title: Forces", "titel: Forces"), HasSubstr("did you mean 'title'"));
   EXPECT_THAT(PaperFindings("measure: difference", "measure: diference"),
               HasSubstr("did you mean 'difference'"));

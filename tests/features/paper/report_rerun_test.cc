@@ -15,7 +15,7 @@ constexpr const char* kSummaryText =
     R"({"verdict": "agree", "exit_code": 0, "checks": [{"name": "a.force_nrmse",
         "value": 1e-8, "limit": 1e-6, "pass": true}]})";
 
-std::string Bent(const std::string& what, const std::string& by) {
+std::string Perturbed(const std::string& what, const std::string& by) {
   std::string text = kSummaryText;
   text.replace(text.find(what), what.size(), by);
   return text;
@@ -26,22 +26,22 @@ RerunOutcome Outcome(const std::string& now, bool exact = false) {
 }
 
 TEST(RerunSummary, ChecksMayMoveByAHundredthOfTheirLimit) {
-  EXPECT_EQ(Outcome(Bent("1e-8", "1.9e-8")), RerunOutcome::kWithin);
-  EXPECT_EQ(Outcome(Bent("1e-8", "2.1e-8")), RerunOutcome::kDiffers);
-  EXPECT_EQ(Outcome(Bent("1e-8", "1.9e-8"), true), RerunOutcome::kDiffers);
+  EXPECT_EQ(Outcome(Perturbed("1e-8", "1.9e-8")), RerunOutcome::kWithin);
+  EXPECT_EQ(Outcome(Perturbed("1e-8", "2.1e-8")), RerunOutcome::kDiffers);
+  EXPECT_EQ(Outcome(Perturbed("1e-8", "1.9e-8"), true), RerunOutcome::kDiffers);
 }
 
 TEST(RerunSummary, VerdictsAndChecksMustBeTheSame) {
-  EXPECT_EQ(Outcome(Bent("agree", "disagree")), RerunOutcome::kDiffers);
-  EXPECT_EQ(Outcome(Bent("\"exit_code\": 0", "\"exit_code\": 1")), RerunOutcome::kDiffers);
-  EXPECT_EQ(Outcome(Bent("true", "false")), RerunOutcome::kDiffers);
-  EXPECT_EQ(Outcome(Bent("a.force_nrmse", "b.force_nrmse")), RerunOutcome::kDiffers);
+  EXPECT_EQ(Outcome(Perturbed("agree", "disagree")), RerunOutcome::kDiffers);
+  EXPECT_EQ(Outcome(Perturbed("\"exit_code\": 0", "\"exit_code\": 1")), RerunOutcome::kDiffers);
+  EXPECT_EQ(Outcome(Perturbed("true", "false")), RerunOutcome::kDiffers);
+  EXPECT_EQ(Outcome(Perturbed("a.force_nrmse", "b.force_nrmse")), RerunOutcome::kDiffers);
   EXPECT_EQ(Outcome("{}"), RerunOutcome::kDiffers);
   EXPECT_EQ(Outcome("no json"), RerunOutcome::kDiffers);
 }
 
 TEST(RerunSummary, NamesTheFirstValueThatDiffers) {
-  const RerunFile file = CompareSummaries("s", kSummaryText, Bent("1e-8", "1.5e-8"), true);
+  const RerunFile file = CompareSummaries("s", kSummaryText, Perturbed("1e-8", "1.5e-8"), true);
   EXPECT_EQ(file.why, "checks/0/value: 1e-08 in the archive, 1.5e-08 now");
 }
 
@@ -110,7 +110,7 @@ RerunReport AReport() {
   return report;
 }
 
-TEST(RerunReport, TellsTheWorstSignalOfEachFile) {
+TEST(RerunReport, ReportsTheWorstSignalOfEachFile) {
   const std::string text = ToText(AReport(), false);
   EXPECT_TRUE(Says(text, "within its limits results/a/traces.csv")) << text;
   EXPECT_TRUE(Says(text,

@@ -1,4 +1,4 @@
-// A result against its repetition: round-off passes, a perturbed number is told.
+// A result against its repetition: round-off passes, a perturbed number is reported.
 #include "features/paper/rerun.h"
 
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ TEST(Rerun, RoundOffIsWithinTheTubes) {
   }
 }
 
-TEST(Rerun, OneNumberBentByAThousandthIsOutside) {
+TEST(Rerun, OneNumberPerturbedByAThousandthIsOutside) {
   for (const LimitColumn column :
        {LimitColumn::kForward, LimitColumn::kInverse, LimitColumn::kReference}) {
     RerunCase c;

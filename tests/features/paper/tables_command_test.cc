@@ -8,7 +8,7 @@
 namespace mbv {
 namespace {
 
-TEST(TablesCommand, WritesLatexAndMarkdownAndTellsIt) {
+TEST(TablesCommand, WritesLatexAndMarkdownAndReportsIt) {
   const Program mbverify("tables");
   const ProgramResult run = mbverify(
       "tables scenarios/four_bar/turn_inverse.yaml --only checks --json - --out " + mbverify.Out());

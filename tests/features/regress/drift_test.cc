@@ -53,7 +53,7 @@ TEST(Drift, OneWildRunDoesNotMoveTheBaseline) {
 TEST(Drift, KeepsTellingSinceWhichRunHoweverLongItLasts) {
   std::vector<PastValue> past = Steady(2e-9, 5);
   for (long run = 6; run < 60; ++run) past.push_back({run, 3e-8, true, true});
-  past[30].good = false;  // a failed night in between
+  past[30].good = false;  // a failed regression in between
   const auto found = FindDrift(past, 3e-8);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->since_run, 6);
@@ -73,7 +73,7 @@ TEST(Drift, ANumberThatIsNoneIsNotDrift) {
   EXPECT_FALSE(FindDrift({}, 1.0));
 }
 
-// Log-normal noise of a factor 2 (one standard deviation) over 2000 nights: never reported.
+// Log-normal noise of a factor 2 (one standard deviation) over 2000 regressions: never reported.
 TEST(Drift, NoiseIsNeverReported) {
   std::mt19937_64 random(20260131);
   std::normal_distribution<double> exponent(0.0, std::log10(2.0));

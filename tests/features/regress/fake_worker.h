@@ -22,11 +22,11 @@ result() {
     [{\"name\": \"analytic\", \"ran\": true}], \"counts\": {\"pairs_compared\": 1}, \"checks\":
     [{\"name\": \"simulated_vs_analytic.force_nrmse\", \"value\": 1e-9, \"limit\": 1e-6,
     \"pass\": true}, {\"name\": \"simulated.closure_m\", \"value\": 1, \"limit\": 0.1,
-    \"pass\": false}], \"versions\": {\"mbverify\": \"0.1.0\"}, \"night\": \"$(cat night.txt)\"}" > "$dir/m/$name/summary.json"
+    \"pass\": false}], \"versions\": {\"mbverify\": \"0.1.0\"}, \"regression\": \"$(cat regression.txt)\"}" > "$dir/m/$name/summary.json"
   printf 'time_s,leg.force.analytic\n0,1\n1,2\n' > "$dir/m/$name/traces.csv"
   echo "{\"inputs\": [{\"file\": \"$file\", \"fingerprint\": \"$(cat "$file.print")\"},
     {\"file\": \"table.csv\", \"fingerprint\": \"$(cat table.print)\"}]}" > "$dir/m/$name/inputs.json"
-  cp night.txt "$dir/m/$name/night.txt"
+  cp regression.txt "$dir/m/$name/regression.txt"
 }
 dir=$4
 file=$2
@@ -53,7 +53,7 @@ class RegressTest : public FolderTest {
     options_.jobs = 2;
     options_.timeout_s = 20.0;
     Table("t,f");
-    Write("night.txt", "1");
+    Write("regression.txt", "1");
   }
   // Adds a scenario of the fake model m; the worker says that it read it, and table.csv.
   static void Scenario(const std::string& name, const std::string& expect = "verdict: agree") {

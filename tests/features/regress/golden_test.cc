@@ -1,4 +1,4 @@
-// Golden traces: kept exactly enough, and told apart by witness.
+// Golden traces: kept exactly enough, and distinguished by witness.
 #include "features/regress/golden.h"
 
 #include <gtest/gtest.h>

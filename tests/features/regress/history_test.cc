@@ -1,4 +1,4 @@
-// The history: whole runs only, whoever writes or is killed; drift and movements told from it.
+// The history: whole runs only, whoever writes or is killed; drift and movements reported from it.
 #include "features/regress/history.h"
 
 #include <signal.h>
@@ -70,7 +70,7 @@ TEST_F(HistoryTest, TenTimesWorseInsideItsLimitIsDriftWithTheRunItBegan) {
   EXPECT_NE(DriftsOf(sixth)[0].since.find("build 0123abcd"), std::string::npos);
 }
 
-TEST_F(HistoryTest, AFiveTimesWorseNightIsNoDrift) {
+TEST_F(HistoryTest, AFiveTimesWorseNightIsNotADrift) {
   for (int i = 0; i < 4; ++i) Night(1e-9);
   EXPECT_TRUE(DriftsOf(Night(5e-9)).empty());
 }
@@ -161,7 +161,7 @@ TEST_F(HistoryTest, OnlyAnotherProgramsLockIsWaitedFor) {
 // A process is killed at many moments of its writing; what is there afterwards are whole runs.
 TEST_F(HistoryTest, KillingAWriterLeavesWholeRunsOnly) {
   constexpr int kCases = 40;
-  const auto night = [] {
+  const auto regression = [] {
     std::vector<CaseResult> cases;
     std::map<std::string, GoldenTraces> goldens;
     for (int i = 0; i < kCases; ++i) {
@@ -171,11 +171,11 @@ TEST_F(HistoryTest, KillingAWriterLeavesWholeRunsOnly) {
     RegressReport report = OneRun(std::move(cases));
     return AppendRun(kFile, goldens, &report);
   };
-  ASSERT_EQ(night(), "");
+  ASSERT_EQ(regression(), "");
   for (int moment = 0; moment < 25; ++moment) {
     const pid_t pid = fork();
     if (pid == 0) {
-      while (night().empty()) {
+      while (regression().empty()) {
       }
       _exit(1);
     }
@@ -191,7 +191,7 @@ TEST_F(HistoryTest, KillingAWriterLeavesWholeRunsOnly) {
               0);
   }
   const long before = Count("SELECT COUNT(*) FROM run");
-  ASSERT_EQ(night(), "") << "and the next run writes as if nothing had happened";
+  ASSERT_EQ(regression(), "") << "and the next run writes as if nothing had happened";
   EXPECT_EQ(Count("SELECT COUNT(*) FROM run"), before + 1);
 }
 
@@ -283,9 +283,9 @@ TEST_F(HistoryTest, FilesOfTheFirstSchemaGoOn) {
   EXPECT_EQ(Count("PRAGMA user_version"), 3);
 }
 
-// A night over whole folders, of scenarios that agree.
-RegressReport NightOf(const std::vector<std::string>& keys,
-                      const std::vector<std::string>& covers = {""}) {
+// A regression over whole folders, of scenarios that agree.
+RegressReport RegressionOf(const std::vector<std::string>& keys,
+                           const std::vector<std::string>& covers = {""}) {
   std::vector<CaseResult> cases;
   cases.reserve(keys.size());
   for (const std::string& key : keys) cases.push_back(AgreeingCase(key, 1e-9));
@@ -304,43 +304,44 @@ std::vector<std::string> MissingOf(const RegressReport& report) {
 using Keys = std::vector<std::string>;
 
 TEST_F(HistoryTest, AScenarioThatIsGoneIsMissingUntilItIsBack) {
-  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y", "b/z"})), Keys{});
-  const RegressReport second = NightOf({"a/x", "b/z"});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x", "a/y", "b/z"})), Keys{});
+  const RegressReport second = RegressionOf({"a/x", "b/z"});
   ASSERT_EQ(MissingOf(second), Keys{"a/y"});
   EXPECT_EQ(second.missing[0].last_run, 1);
   EXPECT_NE(second.missing[0].when.find("run 1 of 2026-01-31"), std::string::npos);
-  EXPECT_EQ(MissingOf(NightOf({"a/x", "b/z"})), Keys{"a/y"}) << "not forgotten after one night";
-  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y", "b/z"})), Keys{});
-  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y", "b/z"})), Keys{});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x", "b/z"})), Keys{"a/y"})
+      << "not forgotten after one regression";
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x", "a/y", "b/z"})), Keys{});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x", "a/y", "b/z"})), Keys{});
 }
 
 TEST_F(HistoryTest, ARunOfAPartMissesNothingElse) {
-  NightOf({"a/x", "a/y", "b/z"});
-  EXPECT_EQ(MissingOf(NightOf({"a/x"}, {"a/"})), Keys{"a/y"});
-  EXPECT_EQ(MissingOf(NightOf({"a/x"}, {})), Keys{}) << "single files";
+  RegressionOf({"a/x", "a/y", "b/z"});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x"}, {"a/"})), Keys{"a/y"});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x"}, {})), Keys{}) << "single files";
   RegressReport shard = OneRun({AgreeingCase("a/x", 1e-9)});
   shard.run.covers = {""};
   shard.run.shard = "1/2";
   ASSERT_EQ(AppendRun(kFile, {}, &shard), "");
   EXPECT_EQ(MissingOf(shard), Keys{});
-  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y"})), Keys{"b/z"});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x", "a/y"})), Keys{"b/z"});
 }
 
 TEST_F(HistoryTest, WhatIsMissingCanBeAccepted) {
-  NightOf({"a/x", "a/y", "b/z"});
-  NightOf({"a/x"});
+  RegressionOf({"a/x", "a/y", "b/z"});
+  RegressionOf({"a/x"});
   EXPECT_NE(AcceptRun(kFile, "last", "a/none", "").trouble, "");
   const HistoryText accepted = AcceptRun(kFile, "last", "a/y", "renamed");
   EXPECT_EQ(accepted.trouble, "");
   EXPECT_NE(accepted.text.find("1 missing in it is meant to be"), std::string::npos);
-  EXPECT_EQ(MissingOf(NightOf({"a/x"})), Keys{"b/z"});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x"})), Keys{"b/z"});
   ASSERT_EQ(AcceptRun(kFile, "last", "", "").trouble, "");
-  EXPECT_EQ(MissingOf(NightOf({"a/x"})), Keys{});
-  NightOf({"a/x", "a/y"});
-  EXPECT_EQ(MissingOf(NightOf({"a/x"})), Keys{"a/y"}) << "it came back, and went again";
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x"})), Keys{});
+  RegressionOf({"a/x", "a/y"});
+  EXPECT_EQ(MissingOf(RegressionOf({"a/x"})), Keys{"a/y"}) << "it came back, and went again";
 }
 
-TEST_F(HistoryTest, AFailureTellsWhenItWasLastAsExpected) {
+TEST_F(HistoryTest, AFailureReportsWhenItWasLastAsExpected) {
   Night(1e-9);
   Night(2e-9, "good-one");
   const auto wrong = [] {
@@ -359,7 +360,7 @@ TEST_F(HistoryTest, AFailureTellsWhenItWasLastAsExpected) {
   }
   EXPECT_EQ(first.runs, 2);
   EXPECT_EQ(second.runs, 3);
-  EXPECT_EQ(Night(1e-9).cases.front().past.runs, 0) << "nothing to tell of what is as expected";
+  EXPECT_EQ(Night(1e-9).cases.front().past.runs, 0) << "nothing to report of what is as expected";
 }
 
 TEST_F(HistoryTest, AnotherProgramsDatabaseIsLeftAlone) {

@@ -1,4 +1,5 @@
-// What a night and a merge write into a folder that holds other things, too, and what they do not.
+// What a regression and a merge write into a folder that holds other things, too, and what they do
+// not.
 #include <sys/resource.h>
 #include <sys/stat.h>
 
@@ -29,7 +30,7 @@ TEST_F(PublishingTest, AFolderFullOfTheUsersFilesKeepsThem) {
                                          "m/agree/snapshots/photo.jpg"};
   for (const std::string& file : mine) Write(file, "mine");
   options_.out = ".";
-  for (int night = 0; night < 3; ++night) {
+  for (int regression = 0; regression < 3; ++regression) {
     const RegressOutcome outcome = RunAll();
     EXPECT_EQ(outcome.exit_code, 0) << outcome.trouble;
     for (const std::string& file : mine) EXPECT_EQ(Read(file), "mine") << file;
@@ -88,14 +89,14 @@ TEST_F(PublishingTest, ScenariosNamedLikeFilesOfTheNightAreRefused) {
   EXPECT_EQ(Calls(), 0);
 }
 
-// A folder called "logs" is the night's and a model's at once, and nobody loses anything.
+// A folder called "logs" is the regression's and a model's at once, and nobody loses anything.
 TEST_F(PublishingTest, ScenariosInAFolderCalledLogsHaveLogsOfTheirOwn) {
   Scenario("agree");
   for (const std::string file : {"scenarios/logs/agree.yaml", "scenarios/logs/m/agree.yaml"}) {
     Write(file, "mechanism: m\nexpect: {verdict: agree}\n");
     Write(file + ".print", ContentFingerprint(Read(file)));
   }
-  for (int night = 0; night < 2; ++night) {
+  for (int regression = 0; regression < 2; ++regression) {
     const RegressOutcome outcome = RunAll();
     EXPECT_EQ(outcome.exit_code, 0) << outcome.trouble;
     for (const std::string key : {"m/agree", "logs/agree", "logs/m/agree"}) {
@@ -122,8 +123,8 @@ TEST_F(PublishingTest, OutputsThatAreScenariosAreRefused) {
   EXPECT_EQ(Read("table.csv"), "t,f");
 }
 
-// Each result whole: of the night before or of this one. Where both are in the folder, or results
-// are newer than the summaries, it says so and is not joined with others.
+// Each result whole: of the regression before or of this one. Where both are in the folder, or
+// results are newer than the summaries, it says so and is not joined with others.
 TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
   Scenario("agree1");
   Scenario("agree2");
@@ -132,13 +133,13 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
   ASSERT_EQ(RunAll().exit_code, 0);
   EXPECT_FALSE(fs::exists("out/unfinished.txt"));
   Write("out/m/agree1/notes.txt", "mine");
-  int mixed = 0, night = 1;
+  int mixed = 0, regression = 1;
   const auto check = [&](int call) {
     for (const std::string name : {"agree1", "agree2"}) {
       const std::string folder = "out/m/" + name + "/";
       const auto json = nlohmann::json::parse(Read(folder + "summary.json"), nullptr, false);
       ASSERT_TRUE(json.is_object()) << call;
-      EXPECT_EQ(json["night"], Read(folder + "night.txt")) << call;
+      EXPECT_EQ(json["regression"], Read(folder + "regression.txt")) << call;
       EXPECT_TRUE(fs::exists(folder + "traces.csv")) << call;
     }
     EXPECT_EQ(Read("out/m/agree1/notes.txt"), "mine") << call;
@@ -147,11 +148,11 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     }
     const auto report = nlohmann::json::parse(Read("out/regress.json"), nullptr, false);
     ASSERT_TRUE(report.is_object()) << call;
-    std::set<std::string> nights = {report["run"]["label"]};
-    for (const char* file : {"out/m/agree1/night.txt", "out/m/agree2/night.txt"}) {
-      nights.insert(Read(file));
+    std::set<std::string> regressions = {report["run"]["label"]};
+    for (const char* file : {"out/m/agree1/regression.txt", "out/m/agree2/regression.txt"}) {
+      regressions.insert(Read(file));
     }
-    if (nights.size() == 1) return;
+    if (regressions.size() == 1) return;
     ++mixed;
     EXPECT_TRUE(fs::exists("out/unfinished.txt")) << call;
     EXPECT_NE(Read("out/index.html").find("has not finished"), std::string::npos) << call;
@@ -160,8 +161,8 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     EXPECT_NE(MergeRuns({"out"}, join).trouble.find("may be of two runs"), std::string::npos);
   };
   for (int call = 1; !HasFailure(); call += 3) {
-    options_.label = std::to_string(++night);
-    Write("night.txt", options_.label);
+    options_.label = std::to_string(++regression);
+    Write("regression.txt", options_.label);
     KillAtCalls killer([&] { _exit(RunAll().exit_code); });
     const bool ended = killer.EndsBefore(call);
     check(call);
@@ -259,7 +260,7 @@ TEST_F(PublishingTest, AHistoryThatFillsTheDiskIsExitCode2ButTheSummariesAreTher
   EXPECT_TRUE(fs::exists("out/regress.json"));
 }
 
-TEST_F(PublishingTest, FoldersThatCannotBeReadAreToldAndTheNightGoesOn) {
+TEST_F(PublishingTest, FoldersThatCannotBeReadAreReportedAndTheNightGoesOn) {
   Scenario("agree");
   fs::create_directories("scenarios/locked");
   fs::permissions("scenarios/locked", fs::perms::none);

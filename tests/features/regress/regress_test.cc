@@ -73,7 +73,7 @@ TEST_F(RegressTest, CrashHangAndWorseAreFailedScenariosWithReasons) {
   EXPECT_EQ(CaseOf(outcome, "m/silent").reason, "exit code 0 but no summary.json");
 }
 
-TEST_F(RegressTest, AWorkerThatCannotStartIsToldAsSuch) {
+TEST_F(RegressTest, AWorkerThatCannotStartIsReportedAsSuch) {
   Scenario("agree");
   options_.worker = {"./no_such_program"};
   const RegressOutcome outcome = RunAll();
@@ -92,7 +92,7 @@ TEST_F(RegressTest, BadInputRunsNothing) {
   EXPECT_EQ(Calls(), 0);
 }
 
-TEST_F(RegressTest, AScenarioThatIsNoYamlAnyMoreDoesNotDropOut) {
+TEST_F(RegressTest, AScenarioThatIsNotAYamlAnyMoreDoesNotDropOut) {
   Scenario("agree");
   Write("scenarios/m/bad.yaml", "mechanism: m\nmotion: {a: [\n");
   const RegressOutcome outcome = RunAll();
@@ -291,7 +291,7 @@ class MergeTest : public RegressTest {
   }
 };
 
-TEST_F(MergeTest, AMissingShardIsExitCodeThreeUnlessToldOtherwise) {
+TEST_F(MergeTest, AMissingShardIsExitCodeThreeUnlessReportedOtherwise) {
   options_.history = "history.sqlite";
   const RegressOutcome outcome = Merge({"shard1", "shard3"});
   EXPECT_EQ(outcome.exit_code, 3);

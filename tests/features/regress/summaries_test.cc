@@ -137,7 +137,7 @@ TEST(Summaries, AllDriftsOfAScenarioAreOneLineWithTheWorstFirst) {
   }
 }
 
-TEST(Summaries, WhatIsMissingIsSaidEverywhere) {
+TEST(Summaries, WhatIsMissingIsReportedEverywhere) {
   RegressReport report = OneRun({AgreeingCase("model/good", 2e-9)});
   for (const auto& [where, text] : AllSummaries(report)) {
     EXPECT_EQ(text.find("gone"), std::string::npos) << where;
@@ -430,7 +430,7 @@ TEST(Thumbnail, OfAPictureTooLargeIsNotMade) {
   EXPECT_EQ(ThumbnailUri(png, 100), "");
 }
 
-TEST(Thumbnail, WhatIsNoPngHasNone) { EXPECT_EQ(ThumbnailUri("no picture", 100), ""); }
+TEST(Thumbnail, WhatIsNotAPngHasNone) { EXPECT_EQ(ThumbnailUri("no picture", 100), ""); }
 
 }  // namespace
 }  // namespace mbv

@@ -90,7 +90,7 @@ TEST_F(InertiaCommand, BadInputIsCodeTwo) {
   EXPECT_NE(over.err.find("which was read for it"), std::string::npos) << over.err;
 }
 
-TEST_F(InertiaCommand, PackagesAreFoundWhereTheyAreSaidToBe) {
+TEST_F(InertiaCommand, PackagesAreFoundWhereTheyAreReportedToBe) {
   const std::string robot = Write("urdf/r.urdf", Robot("package://box_description/box.stl"));
   const std::string folder = (mbverify.folder() / "robot").string();
   EXPECT_EQ(mbverify("inertia " + robot).exit_code, 2);

@@ -47,7 +47,7 @@ TEST_F(RobotCommands, RunTakesARobotAsItIs) {
 }
 
 // The file's own settings are information: whatever they do, the verdict and its exit code stay.
-TEST_F(RobotCommands, RunTellsWhatTheFilesOwnSettingsDo) {
+TEST_F(RobotCommands, RunReportsWhatTheFilesOwnSettingsDo) {
   Write("own.xml", R"(<mujoco model="own"><compiler angle="radian"/>
 <default><equality solref="0.06 1" solimp="0.5 0.5 0.001 0.5 2"/></default><worldbody>
 <body name="crank"><joint name="A" axis="0 1 0"/><inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.001"/>

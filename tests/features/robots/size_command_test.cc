@@ -132,7 +132,7 @@ TEST_F(SizeCommand, NeedsMotors) {
   EXPECT_NE(result.err.find("cart has no motors"), std::string::npos) << result.err;
 }
 
-TEST_F(SizeCommand, RunTellsAllFiguresOnDemand) {
+TEST_F(SizeCommand, RunReportsAllFiguresOnDemand) {
   const ProgramResult brief = mbverify("run " + File("fast.yaml") + Out());
   EXPECT_EQ(brief.exit_code, 0) << brief.out;
   EXPECT_NE(brief.out.find("motor of x: margin 1.07 (continuous)"), std::string::npos) << brief.out;

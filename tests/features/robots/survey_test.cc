@@ -89,7 +89,7 @@ TEST(Survey, ALinkNamedAsAFaultIsNotThatFault) {
   EXPECT_EQ(row.status, "refused") << row.message;
 }
 
-TEST(Survey, TheExitCodeTellsFaultsOfTheFileFromOthers) {
+TEST(Survey, TheExitCodeReportsFaultsOfTheFileFromOthers) {
   const auto exit_of = [](std::vector<std::string> states) {
     std::vector<SurveyRow> rows;
     for (const std::string& status : states) {

@@ -55,7 +55,7 @@ bool Has(const std::string& text, const std::string& part) {
 }
 
 // Terminal, summary.json and report.html all say it.
-void ExpectSaidEverywhere(const RunOutcome& outcome, const std::string& part) {
+void ExpectReportedEverywhere(const RunOutcome& outcome, const std::string& part) {
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_TRUE(Has(ToTable(*outcome.report, {}), part)) << ToTable(*outcome.report, {});
   EXPECT_TRUE(Has(TextOf(fs::path(outcome.folder) / "summary.json"), part));
@@ -80,7 +80,7 @@ prescribed:
 outputs: {tip: arm.tip}
 )";
 
-TEST(Doubts, ForcesThatMuJoCoFindsNotUniqueAreNamed) {
+TEST(VerdictCaveats, ForcesThatMuJoCoFindsNotUniqueAreNamed) {
   const Folder folder("held_twice");
   folder.Write("held_twice.yaml", kHeldTwice);
   const std::string scenario = folder.Write(
@@ -90,19 +90,19 @@ TEST(Doubts, ForcesThatMuJoCoFindsNotUniqueAreNamed) {
   const RunOutcome outcome = RunScenarioFile(scenario, {}, (folder.path / "out").string());
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.report->simulated_not_unique, (std::vector<std::string>{"leg", "lean"}));
-  ExpectSaidEverywhere(outcome, "the forces of leg, lean are not unique");
+  ExpectReportedEverywhere(outcome, "the forces of leg, lean are not unique");
   const auto json = nlohmann::json::parse(TextOf(fs::path(outcome.folder) / "summary.json"));
   EXPECT_EQ(json["simulation"]["forces_not_unique"].size(), 2u);
 }
 
-TEST(Doubts, UniqueForcesRaiseNone) {
+TEST(VerdictCaveats, UniqueForcesRaiseNone) {
   const RunOutcome outcome = RunScenarioFile(Shipped("four_bar/turn_inverse"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_TRUE(outcome.report->simulated_not_unique.empty());
   EXPECT_TRUE(outcome.report->findings.empty()) << outcome.report->findings.Text();
 }
 
-TEST(Doubts, GuessesThatHadToBeDisturbedAreSaidEverywhere) {
+TEST(VerdictCaveats, GuessesThatHadToBeDisturbedAreReportedEverywhere) {
   const Folder folder("disturbed");
   std::string model = TextOf(SourcePath("/models/four_bar/model.yaml"));
   // Links in one line, folded back: no small motion narrows the gap.
@@ -119,20 +119,21 @@ TEST(Doubts, GuessesThatHadToBeDisturbedAreSaidEverywhere) {
                    "mechanism: disturbed.yaml\nmotion: {duration_s: 0.1, sample_s: 0.01, commands: "
                    "{motor: home}}\nanalytic: none\nsimulation: {mode: inverse}\n");
   const RunOutcome outcome = RunScenarioFile(scenario, {}, (folder.path / "out").string());
-  ExpectSaidEverywhere(outcome, "the loops close only by a search");
+  ExpectReportedEverywhere(outcome, "the loops close only by a search");
 }
 
-TEST(Doubts, TheDriverIsNamedEverywhere) {
+TEST(VerdictCaveats, TheDriverIsNamedEverywhere) {
   const Folder folder("driver");
   const RunOutcome outcome =
       RunScenarioFile(Shipped("spr_tripod/default_inverse"), {}, folder.path.string());
-  ExpectSaidEverywhere(outcome,
-                       "ommanded in task space, the simulation follows the drive positions, rates "
-                       "and accelerations that the closed form computes");
-  ExpectSaidEverywhere(outcome, "compare a drive motion with itself");
+  ExpectReportedEverywhere(
+      outcome,
+      "ommanded in task space, the simulation follows the drive positions, rates "
+      "and accelerations that the closed form computes");
+  ExpectReportedEverywhere(outcome, "compare a drive motion with itself");
 }
 
-TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
+TEST(VerdictCaveats, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
   const RunOutcome outcome =
       RunScenarioFile(Shipped("spring_cart/swing"), {{"simulation.step_s", "0.01"}});
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
@@ -144,7 +145,7 @@ TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
 }
 
 // With every DOF commanded the loops open, too, and power is lost with them.
-TEST(Doubts, AStepThatIsTooCoarseForACommandedMotionIsNamedToo) {
+TEST(VerdictCaveats, AStepThatIsTooCoarseForACommandedMotionIsNamedToo) {
   for (const char* step_s : {"0.01", "0.001"}) {
     const RunOutcome outcome =
         RunScenarioFile(Shipped("four_bar/turn"), {{"simulation.step_s", step_s}});
@@ -158,7 +159,7 @@ TEST(Doubts, AStepThatIsTooCoarseForACommandedMotionIsNamedToo) {
 }
 
 // Power that is off by 2e-6 does not lose 1e-5 of the energy.
-TEST(Doubts, ACoarseStepIsToldFromPowerThatIsLost) {
+TEST(VerdictCaveats, ACoarseStepIsReportedFromPowerThatIsLost) {
   const RunOutcome outcome = RunScenarioFile(
       Shipped("four_bar/turn"),
       {{"motion.commands.motor", "[home, {ramp: {rate: 10*pi}}]"}, {"motion.duration_s", "4"}});
@@ -168,7 +169,7 @@ TEST(Doubts, ACoarseStepIsToldFromPowerThatIsLost) {
       << outcome.report->comparison.attribution.text;
 }
 
-TEST(Doubts, AStifferSpringIsNotPutDownToTheStep) {
+TEST(VerdictCaveats, AStifferSpringIsNotPutDownToTheStep) {
   const RunOutcome outcome = RunScenarioFile(Shipped("spring_cart/must_fail/stiffer_spring"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const Attribution& attribution = outcome.report->comparison.attribution;
@@ -177,7 +178,7 @@ TEST(Doubts, AStifferSpringIsNotPutDownToTheStep) {
 }
 
 // A free motion against a table of it: solver and simulation stand together against a wrong one.
-TEST(Doubts, InFreeMotionTwoComputationsStandAgainstATable) {
+TEST(VerdictCaveats, InFreeMotionTwoComputationsStandAgainstATable) {
   const RunOutcome run = RunScenarioFile(Shipped("spring_cart/swing"));
   ASSERT_TRUE(run.report) << run.diagnostics.Text();
   const Trace& trace = run.report->witnesses[1].trace;
@@ -235,7 +236,7 @@ std::string GravityDoubtOf(double g, double density, Verdict* verdict) {
   return outcome.report->findings.Text();
 }
 
-TEST(Doubts, ATableOfAnotherGravityAgreesButNotWithoutAWord) {
+TEST(VerdictCaveats, ATableOfAnotherGravityAgreesButNotWithoutAWord) {
   Verdict verdict = Verdict::kNotRun;
   const std::string said = GravityDoubtOf(9.80665, 1.0, &verdict);
   EXPECT_EQ(verdict, Verdict::kAgree);
@@ -264,7 +265,7 @@ TEST(Concession, RoundedDataAndImpossibleInertiasStandInTheVerdict) {
   const RunOutcome projected =
       RunAllowed(rounded, "bricard/turn_inverse", "closure_tolerance: 3e-3",
                  {{"end: [0, -length, 0]", "end: [1e-3, -length - 5e-4, 3e-4]"}});
-  ExpectSaidEverywhere(projected, "allowed by the model: joint frames moved by up to");
+  ExpectReportedEverywhere(projected, "allowed by the model: joint frames moved by up to");
   EXPECT_EQ(projected.exit_code, 0) << projected.diagnostics.Text();
   // Closed in a short arc only, the far end of the motion would be noise.
   for (const char* rounded_end : {"end: [0, -length - 1e-4, 0]", "end: [0, -length - 1e-3, 0]"}) {
@@ -278,7 +279,7 @@ TEST(Concession, RoundedDataAndImpossibleInertiasStandInTheVerdict) {
                  {{"inertia: [rho*crank*bar^2/2, rho*crank*crank^2/12, rho*crank*crank^2/12]",
                    "inertia: [rho*crank*bar^2/2, rho*crank*crank^2/12, rho*crank*crank^2/3]"}});
   // Alone it is a sentence of its own, with a capital on the page.
-  ExpectSaidEverywhere(allowed, "llowed by the model: impossible inertia of crank");
+  ExpectReportedEverywhere(allowed, "llowed by the model: impossible inertia of crank");
   EXPECT_NE(allowed.exit_code, 0) << "MuJoCo does not take it";
 }
 

@@ -198,7 +198,7 @@ TEST(ResultKind, ChecksEndInFiveWays) {
   EXPECT_EQ(EndOf(check), CheckEnd::kOff);
 }
 
-TEST(ResultKind, APlaceIsToldWithItsTimeIfItHasOne) {
+TEST(ResultKind, APlaceIsReportedWithItsTimeIfItHasOne) {
   ShownCheck check{.name = "", .subject = "", .title = "", .limit = {}};
   EXPECT_EQ(WhereOf(check), "");
   check.time_s = 0.25;

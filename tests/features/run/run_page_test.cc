@@ -1,4 +1,4 @@
-// The page of a run: what the runs of one night share.
+// The page of a run: what the runs of one regression share.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -28,7 +28,7 @@ std::string EquationsSection(const fs::path& out, const std::string& kept) {
   return page.substr(begin, page.find("</section>", begin) - begin);
 }
 
-TEST(RunPage, TheAuditOfANightIsComputedOnceAndReadByTheOthers) {
+TEST(RunPage, TheAuditOfARegressionIsComputedOnceAndReadByTheOthers) {
   const fs::path out = fs::temp_directory_path() / ("mbv_run_page_" + std::to_string(getpid()));
   const fs::path kept = out / "kept", file = kept / "spr_tripod.json";
   const std::string alone = EquationsSection(out, "");

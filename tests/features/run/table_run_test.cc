@@ -86,7 +86,7 @@ TEST(TableRun, ATableOutsideTheMotionIsNotRunAndSaysSo) {
   EXPECT_TRUE(said);
 }
 
-TEST(TableRun, ATableOfAnotherMotionIsSaidToBe) {
+TEST(TableRun, ATableOfAnotherMotionIsReportedToBe) {
   const RunOutcome outcome = RunScenario(
       TableScenario("four_bar/table_matlab"),
       WithoutPictures(

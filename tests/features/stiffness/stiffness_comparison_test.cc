@@ -65,15 +65,15 @@ TEST(StiffnessComparison, EqualWitnessesAgree) {
   EXPECT_TRUE(comparison.not_compared.empty());
 }
 
-struct BentEntry {
+struct PerturbedEntry {
   const char* check;
   std::function<void(StiffnessWitness*)> bend;  // by twice the limit
 };
-void PrintTo(const BentEntry& bend, std::ostream* out) { *out << bend.check; }
+void PrintTo(const PerturbedEntry& bend, std::ostream* out) { *out << bend.check; }
 
-class BentCompliance : public testing::TestWithParam<BentEntry> {};
+class PerturbedCompliance : public testing::TestWithParam<PerturbedEntry> {};
 
-TEST_P(BentCompliance, FailsItsCheckOnly) {
+TEST_P(PerturbedCompliance, FailsItsCheckOnly) {
   std::vector<StiffnessWitness> input = MakeWitnesses();
   GetParam().bend(&input[2]);
   const Comparison comparison = test::CompareAll(input);
@@ -88,7 +88,7 @@ TEST_P(BentCompliance, FailsItsCheckOnly) {
   EXPECT_TRUE(other->pass);
 }
 
-const BentEntry kEntries[] = {
+const PerturbedEntry kEntries[] = {
     {"simulated_vs_analytic.stiffness_entry",
      [](StiffnessWitness* w) { w->result.K(3, 3) *= 1 + 2e-4; }},
     {"simulated_vs_reference.stiffness_entry",
@@ -123,17 +123,20 @@ const BentEntry kEntries[] = {
     {"simulated.residual", [](StiffnessWitness* w) { w->residual = 2e-8; }},
     {"simulated.extrapolation", [](StiffnessWitness* w) { w->extrapolation_error = 2e-5; }},
 };
-INSTANTIATE_TEST_SUITE_P(All, BentCompliance, testing::ValuesIn(kEntries), [](const auto& info) {
-  std::string name = info.param.check;
-  std::replace(name.begin(), name.end(), '.', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, PerturbedCompliance, testing::ValuesIn(kEntries),
+                         [](const auto& info) {
+                           std::string name = info.param.check;
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
 
-TEST(StiffnessComparison, EveryMetricIsBentInATest) {
+TEST(StiffnessComparison, EveryMetricIsPerturbedInATest) {
   for (const MetricRow& row : StiffnessMetricRows()) {
-    EXPECT_TRUE(std::any_of(std::begin(kEntries), std::end(kEntries), [&](const BentEntry& bend) {
-      return std::string(bend.check).ends_with(std::string(".") + row.key);
-    })) << row.key;
+    EXPECT_TRUE(std::any_of(std::begin(kEntries), std::end(kEntries),
+                            [&](const PerturbedEntry& bend) {
+                              return std::string(bend.check).ends_with(std::string(".") + row.key);
+                            }))
+        << row.key;
   }
 }
 

@@ -65,7 +65,7 @@ TEST(StiffnessReport, TheShortLineNamesVerdictValueAndLimit) {
 }
 
 // A witness that broke down: where, by how much, and that nothing is agreed on.
-TEST(StiffnessReport, TellsWhatBrokeDown) {
+TEST(StiffnessReport, ReportsWhatBrokeDown) {
   StiffnessReport report = test::StiffArm();
   StiffnessWitness& reference = report.witnesses[1];
   reference.result = StiffnessResult{};
@@ -104,7 +104,7 @@ TEST(StiffnessReport, TellsWhatBrokeDown) {
 struct Bending {
   const char* what;
   std::function<void(StiffnessReport*)> bend;
-  std::set<std::string> unseen = {};  // where it is not told: it has no place there
+  std::set<std::string> unseen = {};  // where it is not reported: it has no place there
 };
 
 // The truth, perturbed in one place: page, terminal text and summary differ.

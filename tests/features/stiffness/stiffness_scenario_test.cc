@@ -121,7 +121,7 @@ TEST_F(StiffnessScenarioText, ParametersOfTheModelMayStandInThePose) {
   EXPECT_FALSE(result.scenario->pose.contains("d5"));
 }
 
-TEST_F(StiffnessScenarioText, AllThatIsWrongIsSaidAtOnceWithItsPlace) {
+TEST_F(StiffnessScenarioText, AllThatIsWrongIsReportedAtOnceWithItsPlace) {
   const std::string text = FindingsOf(R"(kind: stiffness
 mechanism: scara_robot
 pose: {platform.x: -0.05, platform.y: -0.05, platform.hight: -0.15, platform.yaw: 0.2}
@@ -160,7 +160,7 @@ TEST_F(StiffnessScenarioText, RigidAndUnknownModelsAreRefused) {
             std::string::npos);
 }
 
-TEST_F(StiffnessScenarioText, NothingToComputeIsNoScenario) {
+TEST_F(StiffnessScenarioText, NothingToComputeIsNotAScenario) {
   EXPECT_NE(FindingsOf(std::string(kMinimal) + "analytic: none\nreference: off\nsimulation: off\n")
                 .find("all off"),
             std::string::npos);

@@ -37,7 +37,7 @@ TEST(PointRow, ReadsBackWhatItWrote) {
   EXPECT_EQ(PointHeader(study), "point,seed,exit,reason,m_p,\"a,b\",x.force.max\n");
 }
 
-TEST(PointRow, RefusesWhatIsNoRowOfTheStudy) {
+TEST(PointRow, RefusesWhatIsNotARowOfTheStudy) {
   const Study study = TwoNumbers();
   const std::string good = "1,9,0,,0.5,1,2";
   ASSERT_TRUE(ReadPointLine(good, study));

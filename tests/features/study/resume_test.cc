@@ -17,12 +17,12 @@ class ResumeTest : public testing::Test {
   Program mbverify{testing::UnitTest::GetInstance()->current_test_info()->name()};
 
   void Put(const std::string& name, const std::string& content) const {
-    const fs::path file = mbverify.folder() / "night" / name;
+    const fs::path file = mbverify.folder() / "regression" / name;
     fs::create_directories(file.parent_path());
     std::ofstream(file, std::ios::binary) << content;
   }
   [[nodiscard]] std::string Get(const std::string& name) const {
-    return ReadAll(mbverify.folder() / "night" / name);
+    return ReadAll(mbverify.folder() / "regression" / name);
   }
   static std::string Replaced(std::string text, const std::string& from, const std::string& to) {
     const size_t at = text.find(from);
@@ -30,15 +30,16 @@ class ResumeTest : public testing::Test {
     return at == std::string::npos ? text : text.replace(at, from.size(), to);
   }
   [[nodiscard]] std::string Night(const std::string& more) const {
-    return "regress '" + (mbverify.folder() / "night").string() + "' --out '" + mbverify.Out() +
+    return "regress '" + (mbverify.folder() / "regression").string() + "' --out '" +
+           mbverify.Out() +
            "' --quiet --no-history --no-pictures --no-reports --jobs 1 --worker '" +
-           (mbverify.folder() / "night/worker").string() + "' " + more;
+           (mbverify.folder() / "regression/worker").string() + "' " + more;
   }
-  // A night that is interrupted by its last scenario.
+  // A regression that is interrupted by its last scenario.
   void Interrupted() const {
     Put("stop", "");
     const ProgramResult result = mbverify(Night(""));
-    fs::remove(mbverify.folder() / "night/stop");
+    fs::remove(mbverify.folder() / "regression/stop");
     EXPECT_EQ(result.exit_code, 3) << result.err;
     EXPECT_NE(result.err.find("interrupted after 3 of 4"), std::string::npos) << result.err;
   }
@@ -55,13 +56,13 @@ class ResumeTest : public testing::Test {
     }
     return again;
   }
-  // The program; asked to, it stops the night instead of running the last scenario.
+  // The program; asked to, it stops the regression instead of running the last scenario.
   void PutWorker() const {
     Put("worker",
         "#!/bin/sh\ncase $2 in *z_last.yaml) if [ -e \"$(dirname \"$0\")/stop\" ]; then "
         "kill -INT $PPID; sleep 60; fi;; esac\nexec '" +
             std::string(kBinaryDir) + "/mbverify' \"$@\"\n");
-    fs::permissions(mbverify.folder() / "night/worker", fs::perms::owner_all);
+    fs::permissions(mbverify.folder() / "regression/worker", fs::perms::owner_all);
   }
 };
 

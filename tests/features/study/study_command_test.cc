@@ -89,7 +89,7 @@ TEST_F(StudyCommand, GoesOnWithWhatAKillLeft) {
   EXPECT_EQ(Points("killed"), rows);
   EXPECT_EQ(ReadAll(File("killed/s/forces.bin")), forces);
   EXPECT_FALSE(fs::exists(File("killed/s.part")));
-  // What is finished is told again; what is damaged is computed again.
+  // What is finished is reported again; what is damaged is computed again.
   const auto written = fs::last_write_time(File("killed/s/points.csv"));
   const ProgramResult again = Study("killed", "--resume");
   EXPECT_EQ(again.exit_code, 0);
@@ -232,7 +232,7 @@ TEST_F(StudyCommand, OtherCountsAndSeedsAreOtherStudiesOfTheSameFile) {
 
 // The table is m g of a mass of 2 kg; a study of the same mass is within it, one of 2.1 kg is not.
 // In forward mode the step's error is what converge extrapolates.
-TEST_F(StudyCommand, ANightHasStudies) {
+TEST_F(StudyCommand, ARegressionHasStudies) {
   fs::create_directories(File("scenarios/lift"));
   WriteStudy("{sobol: 4}", "limits: {x.force.mean: {below: 20, share: 0.9}}\n");
   for (const char* name : {"model.yaml", "hold.yaml"}) {
@@ -245,23 +245,23 @@ TEST_F(StudyCommand, ANightHasStudies) {
             "expect: {verdict: disagree, mentions: points violate it}\n");
   Write("scenarios/lift/unexpected.yaml",
         std::regex_replace(study, std::regex("share: 0.9"), "share: 0"));
-  const ProgramResult night =
-      mbverify("regress " + File("scenarios") + " --out " + File("night") + " --no-pictures");
-  EXPECT_EQ(night.exit_code, 1) << night.out << night.err;
-  const nlohmann::json report = nlohmann::json::parse(ReadAll(File("night/regress.json")));
+  const ProgramResult regression =
+      mbverify("regress " + File("scenarios") + " --out " + File("regression") + " --no-pictures");
+  EXPECT_EQ(regression.exit_code, 1) << regression.out << regression.err;
+  const nlohmann::json report = nlohmann::json::parse(ReadAll(File("regression/regress.json")));
   std::map<std::string, nlohmann::json> cases;
   for (const auto& entry : report["cases"]) cases[entry["key"]] = entry;
   EXPECT_EQ(cases["lift/kept"]["status"], "as_expected") << cases["lift/kept"];
   EXPECT_EQ(cases["lift/violated"]["status"], "as_expected") << cases["lift/violated"];
   EXPECT_EQ(cases["lift/unexpected"]["status"], "unexpected") << cases["lift/unexpected"];
-  EXPECT_TRUE(fs::exists(File("night/lift/kept/points.csv")));
+  EXPECT_TRUE(fs::exists(File("regression/lift/kept/points.csv")));
   EXPECT_FALSE(cases["lift/kept"]["inputs"].get<std::string>().empty());
 }
 
 // With bars of another mass in the simulation alone, every point disagrees; others keep their
 // numbers.
 
-TEST_F(StudyCommand, ANumberThatMovesNothingIsSaidAndALimitThatNothingMovesIsRefused) {
+TEST_F(StudyCommand, ANumberThatMovesNothingIsReportedAndALimitThatNothingMovesIsRefused) {
   const auto with = [&](const std::string& vary, const std::string& limits) {
     Write("s.yaml", "study: s\nscenario: hold.yaml\nvary: {" + vary +
                         "}\ndesign: {sobol: 4}\nquantities: [x.force.mean]\n" + limits);

@@ -319,15 +319,15 @@ TEST_F(StudyFiles, OthersMayAskForOtherPoints) {
 }
 
 TEST_F(StudyFiles, AValidationWithoutAWitnessThatIsKnownIsRefusedNotCrashedOn) {
-  for (const auto& [witnesses, told] : {std::pair{"[referense]", "witnesses = 'referense'"},
-                                        {"[]", "witnesses: the list is empty"},
-                                        {"[\"\"]", "witnesses is ''"},
-                                        {"{}", "witnesses"},
-                                        {"[[]]", "witnesses"}}) {
+  for (const auto& [witnesses, reported] : {std::pair{"[referense]", "witnesses = 'referense'"},
+                                            {"[]", "witnesses: the list is empty"},
+                                            {"[\"\"]", "witnesses is ''"},
+                                            {"{}", "witnesses"},
+                                            {"[[]]", "witnesses"}}) {
     ExpectIn(Refusal("{crank: {uniform: {plus_minus_mm: 0.2}}}", "{latin_hypercube: 8}",
                      std::string("quantities: [motor.force.max]\nvalidation: {}\nwitnesses: ") +
                          witnesses + "\n"),
-             told);
+             reported);
   }
 }
 

@@ -38,7 +38,7 @@ StudyReport TwoPoints(double share) {
   return report;
 }
 
-TEST(StudyReport, AVerdictIsToldTheSameEverywhere) {
+TEST(StudyReport, AVerdictIsReportedTheSameEverywhere) {
   const StudyReport violated = TwoPoints(0.49), kept = TwoPoints(0.5);
   EXPECT_EQ(violated.exit_code(), 1);
   EXPECT_EQ(kept.exit_code(), 0);

@@ -80,7 +80,7 @@ TEST(StudySummary, PercentilesAndMomentsAreThoseOfTheNumbers) {
   EXPECT_NEAR(q.deviation, std::sqrt(101.0 * 102.0 / 12.0), 1e-12);
 }
 
-TEST(StudySummary, PointsWithoutAValueAreToldAndViolate) {
+TEST(StudySummary, PointsWithoutAValueAreReportedAndViolate) {
   Study study = OneQuantity(DesignKind::kList);
   study.limits = {{.quantity = 0, .below = 1000.0, .above = {}, .share = 0.0}};
   const PointRows rows = [](const std::function<void(const PointRow&)>& take) {

@@ -55,7 +55,7 @@ TEST(Validation, AnErrorBeyondTheCoverageIsSeen) {
   EXPECT_TRUE(Validate(forces, {.coverage = 2.0, .share = 0.5}).pass());
 }
 
-TEST(Validation, WhatIsNoNumberIsNotInside) {
+TEST(Validation, WhatIsNotANumberIsNotInside) {
   ForceComparison forces = TwoSamples();
   forces.u_input[1] = kNan;
   EXPECT_EQ(Validate(forces, {.coverage = 2.0, .share = 0.0}).outside, 1u);
