@@ -75,7 +75,7 @@ elif how == "nameless":
     del answer["program"]
 elif how == "loud":
     answer["program"] = "planar \x1b[2J\x1b]0;title\x07"
-elif how == "tells":
+elif how == "reports":
     with open(sys.argv[3], "w") as file:
         file.write("\n".join(sorted(os.environ)))
 elif how == "link":
