@@ -21,8 +21,9 @@ constexpr double kWhole = 0.95;  // of the motion: judged up to the samples at i
 bool IsWide(const CheckResult& check) { return check.limit && *check.limit > 1.0; }
 
 bool IsCoarse(const ComparisonInput& input, const CheckResult& check) {
-  // A limit that a table's uncertainty widened is judged with the table.
-  if (!check.limit || check.stated_limit) return false;
+  // A limit that a table's uncertainty widened is judged with the table, one that perturbed forces
+  // set by how much these show.
+  if (!check.limit || (check.stated_limit && !input.motion->free())) return false;
   if (check.metric == Metric::kTableTube || check.metric == Metric::kMotorUse) {
     return IsWide(check);
   }

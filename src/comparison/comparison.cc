@@ -236,6 +236,8 @@ void AddPair(const ComparisonInput& input, const std::string& measured, const st
     LeaveOutReachedMotion(&pair);
   }
   OtherLimits other;
+  other.integrated =
+      input.motion->free() && (measured == role::kReference || truth == role::kReference);
   if (pair.compared && SharesForces(input, measured, truth)) {
     other.growth = GrowthLimits(input, *a->trace);
   }

@@ -85,6 +85,9 @@ struct ComparisonInput {
   DriveMode mode = DriveMode::kPrescribedMotion;  ///< what moves the simulation's drives (driven.h)
   const Trace* perturbed = nullptr;  ///< force-driven: the same run with perturbed forces
   double perturbation = kNan;        ///< by this share of their RMS
+  /// Of a free motion: how far the reference's trajectory is from the exact one, as it states
+  /// itself, lengths over the characteristic length [1]. NaN if it states nothing.
+  double integration_error = kNan;
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
   std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from

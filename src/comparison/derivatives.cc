@@ -30,7 +30,7 @@ constexpr double kAlongTheWay = 4.0;
 constexpr double kShownRates = 1e-6;
 // A drive is judged where at least this share of its samples resolves its motion.
 constexpr double kJudged = 0.5;
-// Commands that turn by more than this between two samples hide whole oscillations [rad].
+// What turns by more than this between two samples hides whole oscillations [rad].
 constexpr double kHidden = 2.0;
 
 // Central differences of orders 4 and 6 at row i of a column, spacing h.
@@ -157,7 +157,7 @@ struct JudgedRate {
   double share = 0.0;
 };
 JudgedRate MeasureDerivative(const Trace& trace, int position, int rate, double scale,
-                             const VecX& missed) {
+                             const VecX& missed, const VecX& turned) {
   const auto n = static_cast<Eigen::Index>(trace.time_s.size());
   const double h = trace.time_s[1] - trace.time_s[0];
   std::vector<Differences> differences(trace.time_s.size());
@@ -183,6 +183,7 @@ JudgedRate MeasureDerivative(const Trace& trace, int position, int rate, double 
     }
     const double unseen = kTruncation * truncation + kAlongTheWay * content * missed[i];
     if (unseen > kTruncation * std::max(kUnresolved * rms, kNegligible * scale)) continue;
+    if (turned[i] > kHidden) continue;
     judged.share += 1.0;
     const double sixth = differences[static_cast<size_t>(i)].sixth;
     const double error = std::abs(sixth - trace.values(i, rate)) - unseen;
@@ -191,6 +192,17 @@ JudgedRate MeasureDerivative(const Trace& trace, int position, int rate, double 
   }
   judged.share = inner > 0.0 ? judged.share / inner : 0.0;
   return judged;
+}
+
+// The largest turn between two samples within reach of the formulas [rad]; 0 of lengths.
+VecX Turned(const Trace& trace, int position) {
+  const auto n = static_cast<Eigen::Index>(trace.time_s.size());
+  VecX turned = VecX::Zero(n);
+  if (trace.channels[static_cast<size_t>(position)].unit != "rad") return turned;
+  for (Eigen::Index i = 1; i < n; ++i) {
+    turned[i] = std::abs(trace.values(i, position) - trace.values(i - 1, position));
+  }
+  return Widest(turned);
 }
 
 struct DriveColumns {
@@ -277,10 +289,11 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
     const double velocity = std::max(rest.velocity, mbv::Rms(trace.values.col(drive.velocity)));
     const double acceleration =
         std::max(rest.acceleration, mbv::Rms(trace.values.col(drive.acceleration)));
-    const JudgedRate first =
-        MeasureDerivative(trace, drive.position, drive.velocity, velocity, missed.of(false));
-    const JudgedRate second =
-        MeasureDerivative(trace, drive.velocity, drive.acceleration, acceleration, missed.of(true));
+    const VecX turned = Turned(trace, drive.position);
+    const JudgedRate first = MeasureDerivative(trace, drive.position, drive.velocity, velocity,
+                                               missed.of(false), turned);
+    const JudgedRate second = MeasureDerivative(trace, drive.velocity, drive.acceleration,
+                                                acceleration, missed.of(true), turned);
     for (const JudgedRate& judged : {first, second}) {
       if (judged.share >= kJudged) KeepWorst(&out->metrics[Metric::kDerivatives], judged.worst);
     }

@@ -10,7 +10,7 @@ namespace mbv {
 /// Central differences of sixth order of positions and velocities against the recorded rates, over
 /// the rate's RMS, at least RestFloorOf() the trace.
 /// Where samples do not resolve the motion nothing is judged: the differences of fourth and sixth
-/// order disagree there, or the commands themselves turn too far between two samples.
+/// order disagree there, or a command or drive turns too far between two samples.
 /// `derivatives_gap` says why drives were not judged.
 void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out);
 

@@ -339,6 +339,14 @@ void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckRes
     check->stated_limit = check->limit;
     check->limit = growth->second;
     check->limit_by = fmt::format("forces perturbed by {:.0e}", input.perturbation);
+  } else if (other.integrated && IsTrajectory(check->metric)) {
+    const bool metres = std::string(RowOf(check->metric).unit) == "m";
+    const double error =
+        input.integration_error * (metres ? CharacteristicLength(*input.mechanism) : 1.0);
+    if (!(error > *check->limit)) return;
+    check->stated_limit = check->limit;
+    check->limit = error;
+    check->limit_by = "the error that the reference states of itself";
   }
 }
 

@@ -209,6 +209,7 @@ void WitnessRuns::HandOver(ComparisonInput* input) const {
   if (table) input->table = &*table;
   if (perturbed) input->perturbed = &*perturbed;
   if (!std::isnan(perturbation)) input->perturbation = perturbation;
+  input->integration_error = integration_error;
 }
 
 WitnessRunner::WitnessRunner(const Prepared& prepared, SimulatedSide side,
@@ -327,6 +328,7 @@ void WitnessRunner::SolveFree(const Role& role) {
                                        {.progress = StageOf(progress_, role::kReference.called)});
   runs_.timing.reference_s = run.summary.wall_s;
   runs_.trust = TrustLine(run);
+  runs_.integration_error = run.uncertainty;
   for (const std::string& text : CrossingTexts(run, scenario().motion.duration_s)) Warn(text);
   Add(role, std::move(run.summary), std::move(run.trace));
 }

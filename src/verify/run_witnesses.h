@@ -70,7 +70,8 @@ struct WitnessRuns {
   double perturbation = kNan;              ///< wrong by this share of their RMS
   Diagnostics bad_input;                   ///< that only the simulation could find
   Diagnostics findings;                    ///< warnings, and ranges that are left
-  std::string trust;  ///< of a free motion: how far the reference can be trusted
+  std::string trust;                ///< of a free motion: how far the reference can be trusted
+  double integration_error = kNan;  ///< of the reference there, as it states it
   Timing timing;
 
   /// The record of a witness; null if it did not take part.

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "comparison/force_scale.h"
+#include "mechanism/reach.h"
 
 #include "tests/comparison/synthetic.h"
 
@@ -388,6 +391,46 @@ TEST(Comparison, WrongRatesAreSeenWithoutAnotherWitness) {
   const Comparison comparison = c.Run();
   EXPECT_TRUE(Fails(comparison, "analytic.derivatives"));
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+}
+
+// A free motion whose reference states an error above the limits is held to that error.
+TEST(IntegrationError, WidensTheLimitsOfTheTrajectoryAlone) {
+  Case run;
+  run.motion.commands.clear();
+  run.motion.initial = {{.name = "d1", .coordinate = {Coordinate::Kind::kDrive, 0, 0}}};
+  run.column = LimitColumn::kForward;
+  const auto check_of = [&](double stated, double off, const char* name) {
+    Case wrong = run;
+    Bend(&wrong.simulated, "d1.position", off);
+    ComparisonInput input = wrong.Input();
+    input.integration_error = stated;
+    const Comparison comparison = Compare(input);
+    const CheckResult* check = comparison.FindCheck(name);
+    EXPECT_NE(check, nullptr);
+    return check == nullptr ? CheckResult{} : *check;
+  };
+  const char* position = "simulated_vs_reference.position_m";
+  const double size = CharacteristicLength(run.mechanism);
+  const CheckResult within = check_of(2.3e-5, 2.0e-5 * size, position);
+  EXPECT_TRUE(within.pass);
+  EXPECT_NEAR(*within.limit, 2.3e-5 * size, 1e-12);
+  ASSERT_TRUE(within.stated_limit);
+  EXPECT_LT(*within.stated_limit, 2e-6 * size);
+  EXPECT_FALSE(check_of(2.3e-5, 2.6e-5 * size, position).pass);
+  EXPECT_FALSE(check_of(kNan, 2.0e-5 * size, position).pass);
+  // An error below the limit changes nothing, and velocities keep theirs.
+  EXPECT_FALSE(check_of(1e-9, 0.0, position).stated_limit);
+  EXPECT_FALSE(check_of(2.3e-5, 0.0, "simulated_vs_reference.velocity_nrmse").stated_limit);
+  // So wide a limit is a caveat.
+  ComparisonInput input = run.Input();
+  const auto wide = [](const Comparison& comparison) {
+    return std::ranges::any_of(comparison.caveats, [](const Caveat& caveat) {
+      return caveat.kind == CaveatKind::kWideLimits;
+    });
+  };
+  EXPECT_FALSE(wide(Compare(input)));
+  input.integration_error = 0.5;
+  EXPECT_TRUE(wide(Compare(input)));
 }
 
 }  // namespace

@@ -253,6 +253,10 @@ int ExitCodeOf(Verdict verdict) {
   return verdict == Verdict::kAgree ? 0 : verdict == Verdict::kDisagree ? 1 : 3;
 }
 
+// What a quarter of the step brings below this share came from the step: first order would leave a
+// quarter.
+constexpr double kStepsShare = 0.3;
+
 class ScenarioRun {
  public:
   ScenarioRun(const std::string& file, const RunOptions& options)
@@ -395,6 +399,7 @@ class ScenarioRun {
         base(), runs_.simulation ? runs_.simulation->X_WB : std::vector<std::vector<Pose>>());
     report_.reactions_not_unique = input.reactions_not_unique;
     report_.comparison = Compare(input);
+    TrySmallerStep(input);
     NameWaivers();
     WarnGravity();
     report_.tables = scenario().motion.tables;
@@ -403,6 +408,50 @@ class ScenarioRun {
     if (!other_engines_.empty()) CompareEngines(input);
     report_.witnesses = std::move(runs_.records);
     SizeMotors();
+  }
+
+  // Where an integrated simulation alone disagrees: is it the mechanism or the step? The same run
+  // with a quarter of the step tells. The verdict stays: it is about the step that the scenario
+  // has.
+  void TrySmallerStep(ComparisonInput input) {
+    const SimulationSettings& settings = scenario().simulation;
+    if (report_.comparison.verdict != Verdict::kDisagree || settings.stock_engine ||
+        settings.mode != DriveMode::kPrescribedMotion) {
+      return;
+    }
+    const CheckResult* worst = nullptr;
+    const auto ratio = [](const CheckResult& check) { return check.value / *check.limit; };
+    for (const CheckResult& check : report_.comparison.checks) {
+      if (!check.limit || check.pass) continue;
+      if (!check.Involves(role::kSimulated)) return;
+      if (worst == nullptr || ratio(check) > ratio(*worst)) worst = &check;
+    }
+    if (worst == nullptr) return;
+    const WitnessRunner runner(*prepared_, {}, options_.progress);
+    SimulationOptions options =
+        OptionsOf(scenario(), prepared_->mechanisms.simulated, Engine::kCorrected);
+    options.step_s *= 0.25;
+    const SimulatedWitness finer = runner.Simulate(options, "a quarter of the step");
+    report_.timing.simulation_s += finer.run.summary.wall_s;
+    if (!finer.run.summary.ok()) return;
+    for (Witness& witness : input.witnesses) {
+      if (witness.name == role::kSimulated) witness.trace = &finer.run.trace;
+    }
+    const Comparison compared = Compare(input);
+    const CheckResult* same = compared.FindCheck(worst->name);
+    Attribution& attribution = report_.comparison.attribution;
+    if (compared.verdict == Verdict::kAgree) {
+      attribution = {role::kSimulated.name,
+                     fmt::format("simulation.step_s = {:g} is too coarse for this motion: with "
+                                 "{:g} all checks pass",
+                                 settings.step_s, options.step_s)};
+    } else if (same != nullptr && same->value < kStepsShare * worst->value) {
+      attribution.text += fmt::format(
+          "{}with simulation.step_s = {:g} the worst check, {}, falls from "
+          "{:.1e} to {:.1e}",
+          attribution.text.empty() ? "" : "; ", options.step_s, worst->name, worst->value,
+          same->value);
+    }
   }
 
   // Whatever the verdict is, it is about a mechanism that the model describes with an exception.

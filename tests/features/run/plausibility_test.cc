@@ -133,14 +133,14 @@ TEST(VerdictCaveats, TheDriverIsNamedEverywhere) {
   ExpectReportedEverywhere(outcome, "compare a drive motion with itself");
 }
 
-TEST(VerdictCaveats, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
+TEST(VerdictCaveats, AStepThatIsTooCoarseIsNamedByARunWithAQuarterOfIt) {
   const RunOutcome outcome =
       RunScenarioFile(Shipped("spring_cart/swing"), {{"simulation.step_s", "0.01"}});
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const Comparison& comparison = outcome.report->comparison;
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
   EXPECT_EQ(comparison.attribution.odd_one_out, "simulated") << comparison.attribution.text;
-  EXPECT_TRUE(Has(comparison.attribution.text, "simulation.step_s is too coarse"))
+  EXPECT_TRUE(Has(comparison.attribution.text, "simulation.step_s = 0.01 is too coarse"))
       << comparison.attribution.text;
 }
 
@@ -153,19 +153,18 @@ TEST(VerdictCaveats, AStepThatIsTooCoarseForACommandedMotionIsNamedToo) {
     const Comparison& comparison = outcome.report->comparison;
     const bool coarse = comparison.verdict == Verdict::kDisagree;
     EXPECT_EQ(coarse, std::string(step_s) == "0.01") << comparison.attribution.text;
-    EXPECT_EQ(Has(comparison.attribution.text, "step_s is too coarse"), coarse)
+    EXPECT_EQ(Has(comparison.attribution.text, "is too coarse for this motion"), coarse)
         << comparison.attribution.text;
   }
 }
 
-// Power that is off by 2e-6 does not lose 1e-5 of the energy.
-TEST(VerdictCaveats, ACoarseStepIsReportedFromPowerThatIsLost) {
+TEST(VerdictCaveats, ADefaultStepThatIsTooCoarseIsNamed) {
   const RunOutcome outcome = RunScenarioFile(
       Shipped("four_bar/turn"),
       {{"motion.commands.motor", "[home, {ramp: {rate: 10*pi}}]"}, {"motion.duration_s", "4"}});
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_TRUE(
-      Has(outcome.report->comparison.attribution.text, "so simulation.step_s is too coarse"))
+      Has(outcome.report->comparison.attribution.text, "simulation.step_s = 0.001 is too coarse"))
       << outcome.report->comparison.attribution.text;
 }
 
