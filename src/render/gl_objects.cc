@@ -1,14 +1,42 @@
 #include "render/gl_objects.h"
 
+#include <dlfcn.h>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <mutex>
 #include <vector>
 
 #include "base/demand.h"
 #include "model_file/mesh/decimate.h"
 
 namespace mbv::render {
+
+#define MBV_GL_DEFINE(name) decltype(&::name) name = nullptr;
+MBV_GL_FUNCTIONS(MBV_GL_DEFINE)
+#undef MBV_GL_DEFINE
+
+std::string LoadGl(const char* library) {
+  static std::mutex mutex;
+  static bool loaded = false;
+  const std::lock_guard lock(mutex);
+  if (loaded) return "";
+  void* const handle = dlopen(library, RTLD_NOW | RTLD_LOCAL);  // stays: so do threads of LLVM
+  if (handle == nullptr) return fmt::format("{} (package libosmesa6)", dlerror());
+  std::string missing;
+  const auto find = [&](const char* name, auto* function) {
+    *function = reinterpret_cast<std::remove_pointer_t<decltype(function)>>(dlsym(handle, name));
+    if (*function == nullptr) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", name);
+  };
+#define MBV_GL_FIND(name) find(#name, &name);
+  MBV_GL_FUNCTIONS(MBV_GL_FIND)
+#undef MBV_GL_FIND
+  if (!missing.empty()) return fmt::format("{} has no {}", library, missing);
+  loaded = true;
+  return "";
+}
 namespace {
 
 GLuint CompiledShader(GLenum kind, const std::string& source) {

@@ -1,4 +1,6 @@
-// Small owners of OpenGL objects (3.3, core profile). A context must be current.
+// OpenGL (3.3, core profile) as OSMesa has it, and small owners of its objects, for which a context
+// must be current. OSMesa, and LLVM, which compiles its shaders, are loaded with the first picture:
+// they would take half the start of a program that draws nothing.
 #pragma once
 
 #ifndef GL_GLEXT_PROTOTYPES  // mbv_render has it for all its files, whatever they include first
@@ -6,6 +8,8 @@
 #endif
 #include <GL/gl.h>
 #include <GL/glext.h>
+#include <GL/osmesa.h>
+
 #include <map>
 #include <memory>
 #include <string>
@@ -17,7 +21,35 @@
 #include "render/scene.h"
 #include "render/tessellation.h"
 
+// What is drawn with.
+// clang-format off
+#define MBV_GL_FUNCTIONS(F)                                                                       \
+  F(OSMesaCreateContextAttribs) F(OSMesaDestroyContext) F(OSMesaMakeCurrent) F(glActiveTexture)   \
+  F(glAttachShader) F(glBindBuffer) F(glBindFramebuffer) F(glBindTexture) F(glBindVertexArray)    \
+  F(glBlendFunc) F(glBufferData) F(glCheckFramebufferStatus) F(glClear) F(glClearColor)           \
+  F(glClearStencil) F(glColorMask) F(glCompileShader) F(glCreateProgram) F(glCreateShader)        \
+  F(glCullFace) F(glDeleteBuffers) F(glDeleteFramebuffers) F(glDeleteProgram) F(glDeleteShader)   \
+  F(glDeleteTextures) F(glDeleteVertexArrays) F(glDepthFunc) F(glDepthMask) F(glDisable)          \
+  F(glDrawArrays) F(glDrawBuffer) F(glDrawElements) F(glEnable) F(glEnableVertexAttribArray)      \
+  F(glFramebufferTexture2D) F(glFrontFace) F(glGenBuffers) F(glGenFramebuffers)                   \
+  F(glGenTextures) F(glGenVertexArrays) F(glGenerateMipmap) F(glGetError) F(glGetIntegerv)        \
+  F(glGetProgramiv) F(glGetShaderInfoLog) F(glGetShaderiv) F(glGetUniformLocation)                \
+  F(glIsEnabled) F(glLinkProgram) F(glPixelStorei) F(glPolygonOffset) F(glReadBuffer)             \
+  F(glReadPixels) F(glShaderSource) F(glStencilFunc) F(glStencilOp) F(glTexImage2D)               \
+  F(glTexParameterfv) F(glTexParameteri) F(glUniform1f) F(glUniform1i) F(glUniform2fv)            \
+  F(glUniform3fv) F(glUniform4fv) F(glUniformMatrix3fv) F(glUniformMatrix4fv) F(glUseProgram)     \
+  F(glVertexAttribPointer) F(glViewport)
+// clang-format on
+
 namespace mbv::render {
+
+// Code of this namespace finds these before those of <GL/gl.h>, which are declared only.
+#define MBV_GL_DECLARE(name) extern decltype(&::name) name;
+MBV_GL_FUNCTIONS(MBV_GL_DECLARE)
+#undef MBV_GL_DECLARE
+
+/// Loads `library` with the first call that succeeds; "" or why nothing can be drawn.
+[[nodiscard]] std::string LoadGl(const char* library = "libOSMesa.so.8");
 
 /// A linked program. A failure to compile is our own bug.
 class GlProgram {

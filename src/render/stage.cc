@@ -1,6 +1,5 @@
 #include "render/stage.h"
 
-#include <GL/osmesa.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -46,6 +45,7 @@ class OsMesaStage final : public Stage {
   }
 
   RunSummary Make() {
+    if (const std::string trouble = LoadGl(); !trouble.empty()) return Failure(trouble);
     const std::array<int, 11> wanted = {OSMESA_FORMAT,
                                         OSMESA_RGBA,
                                         OSMESA_DEPTH_BITS,

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 #include <png.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <set>
 
 #include "render/camera.h"
+#include "render/gl_objects.h"
 #include "render/scene.h"
 #include "render/stage.h"
 #include "tests/mechanisms/rendered.h"
@@ -327,6 +330,20 @@ TEST(Pictures, DrawBodiesWithoutShapesAsRods) {
     return p[0] > 100 && p[1] < 0.75 * p[0] && p[2] < 0.4 * p[0];
   };
   EXPECT_GT(BoundsOf(with_rod, is_accent).count, 100);
+}
+
+// In a process of its own, where nothing has been drawn yet.
+TEST(OpenGl, ThatIsMissingIsNamedWithItsPackage) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto ask = [](const char* library) {
+    std::fputs(render::LoadGl(library).c_str(), stderr);
+    std::exit(0);
+  };
+  EXPECT_EXIT(ask("libNoMesa.so.8"), testing::ExitedWithCode(0),
+              "libNoMesa.so.8.*package libosmesa6");
+  EXPECT_EXIT(ask("libz.so.1"), testing::ExitedWithCode(0),
+              "libz.so.1 has no OSMesaCreateContextAttribs, ");
+  EXPECT_EQ(render::LoadGl(), "");
 }
 
 TEST(Png, IsReadBackPixelForPixel) {
