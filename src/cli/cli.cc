@@ -14,7 +14,6 @@
 #include <cstring>
 #include <filesystem>
 #include <new>
-#include <ranges>
 #include <sstream>
 #include <system_error>
 
@@ -276,9 +275,7 @@ std::vector<std::string> WordsOf(int argc, char** argv, std::span<const FormerNa
   for (const FormerName& name : former) {
     if (words.empty() || words.front() != name.name) continue;
     words.erase(words.begin());
-    for (const char* word : name.now | std::views::reverse) {
-      if (word != nullptr) words.insert(words.begin(), word);
-    }
+    words.insert(words.begin(), name.now.begin(), std::ranges::find(name.now, nullptr));
     break;
   }
   std::ranges::reverse(words);

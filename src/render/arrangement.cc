@@ -159,10 +159,12 @@ std::vector<LegendEntry> LegendOf(const Mechanism& mechanism, const Arrangement&
   if (options.closures && any_closure) legend.push_back({"closure", "loop closure"});
   const bool ground_seen = arrangement.camera.position_D().z() >= arrangement.stage.ground_m;
   if (options.output_frames && !mechanism.outputs.empty()) {
+    legend.push_back({"", mechanism.outputs.size() == 1
+                              ? "axes of " + mechanism.outputs[0].name + ":"
+                              : "axes of the outputs:"});
     legend.push_back({"x_axis", "x"});
     legend.push_back({"y_axis", "y"});
-    legend.push_back({"z_axis", mechanism.outputs.size() == 1 ? "z of " + mechanism.outputs[0].name
-                                                              : "z of the outputs"});
+    legend.push_back({"z_axis", "z"});
   }
   for (const PolylineOverlay& path : overlay.paths) {
     if (!path.name.empty()) legend.push_back({path.color, path.name});

@@ -243,10 +243,10 @@ class Sight {
     PictureOptions plain = options;
     plain.output_frames = false;
     for (const Item& item : MechanismItems(mechanism, frame, scale, plain)) {
-      if (item.framing == Framing::kNever) continue;
+      const bool glass = item.material.rgba[3] < 0.5F;
+      if (item.framing == Framing::kNever && !glass) continue;
       Vec3 high = item.size;
       if (item.solid == Solid::kCapsule) high.z() += item.size.x();
-      const bool glass = item.material.rgba[3] < 0.5F;
       scene.blockers.push_back(
           {.X_GW = item.X_WG.inverse(), .low = -high, .high = high, .share = glass ? kVeil : 1.0});
     }

@@ -446,7 +446,8 @@ void FlatPass::Draw(const Projection& view) const {
 namespace {
 
 constexpr int kTexture_px = 1024, kShadowMap_px = 1024;
-constexpr double kSun_deg = 2.5;       // width of the key light, which makes shadows soft
+constexpr double kSun_deg = 1.2;       // width of the key light, which makes shadows soft: so much
+                                       // that those of thin rods do not part into lines
 constexpr double kGhostOpacity = 0.3;  // opacity of an earlier instant
 constexpr double kHaze = 40.0;         // radii from which the ground is all haze
 constexpr int kShadowUnit = 0, kOtherUnit = 1;

@@ -390,7 +390,8 @@ std::vector<Item> MechanismItems(const Mechanism& mechanism, const PictureFrame&
       if (b == 0 && shape.color == "sea") continue;  // drawn as an endless plane
       AddShape(shape, frame.X_WB[b], &items);
       if (b == 0 && !items.empty() && items.back().framing == Framing::kAlways) {
-        items.back().framing = Framing::kIfNear;
+        const bool window = shape.color == "glass" || shape.color == "glass_frame";
+        items.back().framing = window ? Framing::kNever : Framing::kIfNear;
       }
     }
     if (body.shapes.empty() && !massless_piece && !(b == 0 && any_shapes)) {

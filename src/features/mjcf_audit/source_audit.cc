@@ -185,9 +185,9 @@ void CloseBands(Trace* run, Trace* truth) {
     const int middle = truth->Find(Quantity::kForce, band.subject);
     const int force = run->Find(Quantity::kForce, band.subject);
     if (middle < 0 || force < 0) continue;
-    for (Eigen::Index i = 0; i < truth->values.rows(); ++i) {
-      double& half = truth->values(i, static_cast<Eigen::Index>(c));
-      const double off = run->values(i, force) - truth->values(i, middle);
+    for (const auto& [i, j] : AlignSamples(*run, *truth)) {
+      double& half = truth->values(j, static_cast<Eigen::Index>(c));
+      const double off = run->values(i, force) - truth->values(j, middle);
       if (half > 0.0) run->values(i, force) -= std::clamp(off, -half, half);
       half = 0.0;
     }
@@ -220,6 +220,8 @@ void SourceModelRuns::MeasureForces(const SourceModelRun& own_run, SourceModelEr
 
 void SourceModelRuns::MeasureJointForces(const Trace& trace, SourceModelError* error) const {
   double wrong = 0.0, right = 0.0;
+  // A file with another step in it is sampled at other times.
+  const CommonSamples samples = AlignSamples(trace, truth_->trace);
   for (size_t c = 0; c < trace.channels.size(); ++c) {
     const Channel& channel = trace.channels[c];
     if (channel.quantity != Quantity::kReaction ||
@@ -228,11 +230,10 @@ void SourceModelRuns::MeasureJointForces(const Trace& trace, SourceModelError* e
     }
     const int other = truth_->trace.Find(channel.name);
     if (other < 0) continue;
-    for (size_t i = 0; i < trace.time_s.size(); ++i) {
-      if (trace.time_s[i] < SourceModelAudit().later_s) continue;
-      const auto row = static_cast<Eigen::Index>(i);
-      const double truth = truth_->trace.values(row, other);
-      const double off = trace.values(row, static_cast<Eigen::Index>(c)) - truth;
+    for (const auto& [i, j] : samples) {
+      if (trace.time_s[static_cast<size_t>(i)] < SourceModelAudit().later_s) continue;
+      const double truth = truth_->trace.values(j, other);
+      const double off = trace.values(i, static_cast<Eigen::Index>(c)) - truth;
       if (!std::isfinite(off)) continue;
       wrong += off * off;
       right += truth * truth;

@@ -267,6 +267,13 @@ TEST_F(SourceModelAudits, ThatDivergesGivesATimeAndNoNumbers) {
   EXPECT_FALSE(audit.as_is.sound());
   EXPECT_GE(audit.as_is.time_s, 0.0);
   EXPECT_TRUE(std::isnan(audit.as_is.force));
+  // The recommended step is another one, and with it the samples of the file with its lines.
+  ASSERT_GE(audit.recommended, 0);
+  const SourceModelError& promised = audit.trials[static_cast<size_t>(audit.recommended)].error;
+  EXPECT_NE(audit.trials[static_cast<size_t>(audit.recommended)].step_s, 0.05);
+  EXPECT_GT(promised.joint_force, 0.0);
+  EXPECT_NEAR(audit.pasted.joint_force, promised.joint_force, 1e-3 * promised.joint_force);
+  EXPECT_NEAR(audit.pasted.force, promised.force, 1e-3 * promised.force);
   EXPECT_NE(SourceModelSentence(audit).find("no forces that could be compared"), std::string::npos)
       << SourceModelSentence(audit);
 }
