@@ -14,7 +14,7 @@ const LIBRARIES = {
   'HDF5': { headers: ['hdf5.h'], target: 'PkgConfig::HDF5' },
   'matio': { headers: ['matio.h'], target: 'PkgConfig::MATIO' },
   'Pango': { headers: ['pango/'], target: 'PkgConfig::PANGO' },
-  'OSMesa': { headers: ['GL/'], target: 'PkgConfig::OSMESA' },
+  'OSMesa': { headers: ['GL/'], target: '${CMAKE_DL_LIBS}' },  // loaded at run time
   'SQLite': { headers: ['sqlite3'], target: 'SQLite::SQLite3' },
   'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },
   'KLU': { headers: ['suitesparse/'], target: 'KLU::KLU' },

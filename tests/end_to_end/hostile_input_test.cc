@@ -164,7 +164,7 @@ TEST_F(HostileInputTest, ARunThatDoesNotFitIntoMemoryCouldNotRunAndSaysWhatIsLar
       "\"$mbverify\" run -q --no-pictures --set motion.sample_s=0.00002 --set "
       "simulation.mode=inverse --out '" +
       mbverify.Out() + "' scenarios/slider_crank/turn.yaml";
-  const ProgramResult result = mbverify.Script("ulimit -v 400000; " + run);
+  const ProgramResult result = mbverify.Script("ulimit -v 250000; " + run);
   EXPECT_EQ(result.exit_code, 3) << result.out << result.err;
   EXPECT_NE(result.err.find("out of memory: 100000 samples of"), std::string::npos) << result.err;
 }
