@@ -280,6 +280,7 @@ namespace {
 struct HistoryArguments {
   std::string history = "out/regress/history.sqlite";
   std::string run_a, run_b, csv, scenario, note;
+  bool changed = false;
   JsonOption list_json, compare_json;  // each names its own command
 };
 
@@ -316,10 +317,12 @@ void AddHistoryCommand(CLI::App* app, int* exit_code) {
   CLI::App* compare = history->add_subcommand("compare", "What differs between two runs");
   compare->add_option("run1", arguments->run_a, "number, last or last~1")->required();
   compare->add_option("run2", arguments->run_b, "number, last or last~1")->required();
+  compare->add_flag("--changed", arguments->changed, "only scenarios in which something changed");
   arguments->compare_json.AddTo(compare);
   compare->callback([arguments, exit_code] {
-    *exit_code = Show(CompareRuns(arguments->history, arguments->run_a, arguments->run_b),
-                      *arguments, arguments->compare_json);
+    *exit_code = Show(
+        CompareRuns(arguments->history, arguments->run_a, arguments->run_b, arguments->changed),
+        *arguments, arguments->compare_json);
   });
   CLI::App* csv = history->add_subcommand("export", "All metrics of all runs as CSV");
   csv->add_option("--csv", arguments->csv, "write to this file instead of stdout");
@@ -336,7 +339,7 @@ void AddHistoryCommand(CLI::App* app, int* exit_code) {
   });
   const char* codes = "0 done, 2 bad input";
   SetFooter(list, {"history list", "history list --history nightly.sqlite"}, codes);
-  SetFooter(compare, {"history compare last~1 last", "history compare 3 7"}, codes);
+  SetFooter(compare, {"history compare last~1 last --changed", "history compare 3 7"}, codes);
   SetFooter(csv, {"history export --csv metrics.csv"}, codes);
   SetFooter(accept, {"history accept last --scenario spr_tripod/default --note \"stiffer legs\""},
             codes);
