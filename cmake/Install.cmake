@@ -6,6 +6,8 @@ install(TARGETS mbverify COMPONENT runtime)
 install(DIRECTORY models scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/mbverify COMPONENT runtime)
 install(FILES src/external/mechanism.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/mbverify
         COMPONENT runtime)
+install(DIRECTORY docs/reference/schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/mbverify
+        COMPONENT runtime)
 install(DIRECTORY examples docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 # The program writes the scripts by which shells complete its commands.
 set(completions ${CMAKE_BINARY_DIR}/completions)

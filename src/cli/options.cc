@@ -53,15 +53,19 @@ int JsonOption::Write(const std::string& json, const std::vector<InputFile>& inp
 int JsonOption::Write(const nlohmann::ordered_json& json,
                       const std::vector<InputFile>& inputs) const {
   if (!wanted()) return 0;
+  const std::string text = Text(json);
+  if (path_ != "-") return WriteWholeFile(path_, text, inputs);
+  fmt::print("{}", text);
+  return 0;
+}
+
+std::string JsonOption::Text(const nlohmann::ordered_json& json) const {
   MBV_DEMAND(json.is_object(), command_);
   nlohmann::ordered_json whole = {
       {"schema", json.value("schema", fmt::format("mbverify.{}/1", command_))},
       {"program", fmt::format("mbverify {}", kVersion)}};
   whole.update(json);
-  const std::string text = Dump(whole);
-  if (path_ != "-") return WriteWholeFile(path_, text, inputs);
-  fmt::print("{}", text);
-  return 0;
+  return Dump(whole);
 }
 
 nlohmann::ordered_json FindingObjects(const Diagnostics& diagnostics) {

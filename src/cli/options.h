@@ -23,7 +23,8 @@ void AddAssemblyOption(CLI::App* command, std::vector<std::string>* texts);
 
 class JsonOption {
  public:
-  /// What is written has `schema` ("mbverify.COMMAND/1", if it states none) and `program` in front.
+  /// What is written has `schema` ("mbverify.COMMAND/1", if it states none) and `program` in front;
+  /// docs/reference/schemas/ has a JSON Schema of each.
   void AddTo(CLI::App* command);
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -33,6 +34,8 @@ class JsonOption {
   /// Writes what was asked for, but not over one of `inputs`. Exit code as of
   /// WriteWholeFile().
   [[nodiscard]] int Write(const std::string& json, const std::vector<InputFile>& inputs) const;
+  /// The same as a text, for who prints it: with `schema` and `program` in front.
+  [[nodiscard]] std::string Text(const nlohmann::ordered_json& json) const;
   [[nodiscard]] int Write(const nlohmann::ordered_json& json,
                           const std::vector<InputFile>& inputs) const;
 

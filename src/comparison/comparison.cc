@@ -445,7 +445,7 @@ const char* ToText(WitnessGap gap) {
     case WitnessGap::kBadAnswer:
       return "bad_answer";
     case WitnessGap::kDeclined:
-      return "not applicable";
+      return "declined";
     case WitnessGap::kNoForces:
       return "no_forces";
   }

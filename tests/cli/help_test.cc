@@ -1,11 +1,11 @@
 // Help, hints and terminals, for every subcommand that the program has.
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
 
 #include "base/text.h"
+#include "tests/support/commands.h"
 #include "tests/support/run_program.h"
 #include "tests/support/source_dir.h"
 
@@ -27,30 +27,10 @@ std::vector<std::string> LinesOf(const std::string& text) {
 
 class HelpTest : public testing::Test {
  protected:
-  // Names below the headings of a command's help, with the command before them.
   std::vector<std::string> Below(const std::string& command) const {
-    std::vector<std::string> names;
-    bool inside = false;
-    static const std::set<std::string> kHeadings = {
-        "Subcommands:",       "Start:",   "Verify:",  "Understand:",
-        "Robots and motors:", "Engines:", "Publish:", "Shell:"};
-    for (const std::string& line : LinesOf(mbverify(command + " --help").out)) {
-      inside = kHeadings.contains(line) || (inside && line.starts_with("  "));
-      const bool is_name = inside && line.starts_with("  ") && line.size() > 2 && line[2] != ' ';
-      if (is_name) {
-        names.push_back((command.empty() ? "" : command + " ") +
-                        line.substr(2, line.find(' ', 2) - 2));
-      }
-    }
-    return names;
+    return test::CommandsBelow(mbverify, command);
   }
-  std::vector<std::string> Commands() const {
-    std::vector<std::string> all = Below("");
-    for (const std::string& command : Below("")) {
-      for (const std::string& inner : Below(command)) all.push_back(inner);
-    }
-    return all;
-  }
+  std::vector<std::string> Commands() const { return test::AllCommands(mbverify); }
   ProgramResult WithColumns(int columns, const std::string& arguments) const {
     return mbverify.Script("COLUMNS=" + std::to_string(columns) + " \"$mbverify\" " + arguments);
   }
@@ -287,27 +267,6 @@ TEST_F(HelpTest, TablesFitTheTerminal) {
         EXPECT_LE(PrintedWidth(line), static_cast<size_t>(columns)) << arguments << ": " << line;
       }
     }
-  }
-}
-
-TEST_F(HelpTest, JsonOfEachCommandNamesItsSchemaAndTheProgram) {
-  const std::string out = " --out " + mbverify.Out() + "/x";
-  const std::vector<std::pair<std::string, std::string>> calls = {
-      {"run four_bar/turn_inverse --no-pictures --no-report" + out, "run/1"},
-      {"audit spr_tripod", "audit/1"},
-      {"figures four_bar/turn --only drive_torques" + out, "figures/1"},
-      {"tables four_bar/turn" + out, "tables/1"},
-      {"size slider_crank/buffer", "sizing/1"},
-      {"survey models/four_bar", "survey/1"},
-      {"converge four_bar/turn", "convergence/1"},
-      {"sensitivity four_bar/turn_inverse --parameter rho --no-search", "mutate/2"}};
-  for (const auto& [call, schema] : calls) {
-    const ProgramResult result = mbverify(call + " --json -");
-    const auto json = nlohmann::json::parse(result.out, nullptr, false);
-    ASSERT_TRUE(json.is_object()) << call << "\n" << result.out.substr(0, 300) << result.err;
-    EXPECT_EQ(json["schema"], "mbverify." + schema) << call;
-    EXPECT_EQ(json["program"].get<std::string>().substr(0, 9), "mbverify ") << call;
-    EXPECT_TRUE(result.out.starts_with("{\n  \"schema\"")) << result.out.substr(0, 60);
   }
 }
 

@@ -13,6 +13,8 @@ prefix/bin/mbverify run prefix/share/mbverify/scenarios/spr_tripod/static.yaml -
 grep -q "_mbverify mbverify" prefix/share/bash-completion/completions/mbverify
 grep -q "^#compdef mbverify" prefix/share/zsh/vendor-completions/_mbverify
 grep -q "complete -c mbverify" prefix/share/fish/vendor_completions.d/mbverify.fish
+# Schemas of JSON, one of each document.
+grep -q '"mbverify.run/1"' prefix/share/mbverify/schemas/run.schema.json
 # The example, copied away from the source tree.
 cp -r "$source/examples/closed_form" example
 "$cmake" -S example -B example/build -G Ninja -DCMAKE_PREFIX_PATH="$work/prefix" >configure.log

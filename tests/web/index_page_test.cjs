@@ -76,7 +76,7 @@ test('What went wrong stands above the table: check, value, limit, place, and wh
   assert.match(text, /wrong_expectation: unexpected|wrong_expectation unexpected/);
   assert.match(text, /exit code 0, expected 1/);
   // tight: its limits were made smaller after the first run.
-  assert.match(text, /simulated_vs_analytic\.force_nrmse is [\d.]+e-\d+, limit 1\.0e-2\d/);
+  assert.match(text, /drive force, RMS \(simulated vs analytic\) is [\d.]+e-\d+, limit 1\.0e-2\d/);
   assert.match(text, /, at leg\d\.drive\.force|, at \w+\.force/);
   assert.match(text, /; was [\d.]+e-\d+ in run 1/);
   assert.match(text, /was ok in run 1 of /);

@@ -59,7 +59,9 @@ void PrintPackage(const PackageArguments& arguments, const PackageOutcome& outco
 
 nlohmann::ordered_json PackageJson(const PackageArguments& arguments, const PackageOutcome& outcome,
                                    int exit_code) {
-  nlohmann::ordered_json json = {{"archive", arguments.out}, {"exit_code", exit_code}};
+  // "package" is the schema of the manifest in it.
+  nlohmann::ordered_json json = {
+      {"schema", "mbverify.archive/1"}, {"archive", arguments.out}, {"exit_code", exit_code}};
   if (!outcome.zip.empty()) {
     json["bytes"] = outcome.zip.size();
     json["sha256"] = Sha256Hex(outcome.zip);

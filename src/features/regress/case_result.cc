@@ -204,6 +204,7 @@ Json CaseJson(const CaseResult& result) {
   json["kept"] = result.kept;
   json["drifts"] = DriftsJson(result);
   if (result.past.runs > 0) json["past"] = PastJson(result.past);
+  if (!result.changes.empty()) json["changes"] = result.changes;
   json["course"] = Json::array();
   for (double value : result.course) json["course"].push_back(Number(value));
   return json;
@@ -261,6 +262,9 @@ CaseResult CaseOf(const JsonValue& json) {
                              drift.at("since")});
   }
   if (json.contains("past")) result.past = PastOf(json.at("past"));
+  if (json.contains("changes")) {
+    result.changes = json.at("changes").get<std::vector<std::string>>();
+  }
   for (const JsonValue& value : json.at("course").list()) {
     result.course.push_back(value.NumberOrNan());
   }

@@ -63,6 +63,9 @@ struct PastOfFailure {
   std::map<std::string, double> values;  ///< then, of the checks that fail now
 };
 
+/// What else changed between two results of a scenario, one short text each.
+using Changes = std::vector<std::string>;
+
 /// A scenario that an earlier run had and this one should have had.
 struct MissingCase {
   std::string key;
@@ -99,6 +102,7 @@ struct CaseResult {
   bool kept = false;     ///< taken over from the interrupted run (--resume)
 
   PastOfFailure past;          ///< filled from the history, of failed scenarios
+  Changes changes;             ///< since the last good run, of what failed or drifted in this run
   std::vector<Drift> drifts;   ///< filled from the history
   std::vector<double> course;  ///< key metric of the last runs, oldest first, this one included
 

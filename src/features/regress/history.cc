@@ -46,6 +46,9 @@ CREATE TABLE IF NOT EXISTS metric(
 CREATE TABLE IF NOT EXISTS version(
   run INTEGER NOT NULL REFERENCES run(id), name TEXT NOT NULL, version TEXT NOT NULL,
   PRIMARY KEY(run, name)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS input_file(
+  inputs TEXT NOT NULL, file TEXT NOT NULL, fingerprint TEXT NOT NULL,
+  PRIMARY KEY(inputs, file)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS drift(
   result INTEGER NOT NULL REFERENCES result(id), metric TEXT NOT NULL,
   value REAL, baseline REAL, since_run INTEGER NOT NULL, text TEXT NOT NULL,
@@ -165,6 +168,7 @@ class Appender {
       FillCourse(scenario, &result);
       FillPast(scenario, report->run.id, &result);
       const long id = InsertResult(report->run.id, scenario, result);
+      FillChanges(scenario, report->run.id, id, &result);
       if (golden != goldens.end()) InsertGolden(id, golden->second);
     }
     report->missing = FindMissing(db_, report->run.id);
@@ -265,8 +269,8 @@ class Appender {
       if (found->since_run != 0) drift.since = DescribeRun(db_, found->since_run);
       drift.text = fmt::format(
           "{} is {:.2e}, {:.0f} times the median {:.2e} of {} good runs (reported above {:.1e}{})",
-          name, metric.value, metric.value / found->baseline, found->baseline, found->good_runs,
-          found->threshold,
+          QuantityText(name), metric.value, metric.value / found->baseline, found->baseline,
+          found->good_runs, found->threshold,
           metric.limit ? fmt::format(", limit {:.1e}", *metric.limit) : ", no limit");
       result->drifts.push_back(std::move(drift));
     }
@@ -331,6 +335,24 @@ class Appender {
     }
   }
 
+  // What else changed since the newest good run: where a scenario fails, or began to drift.
+  void FillChanges(long scenario, long run, long id, CaseResult* result) {
+    result->changes.clear();
+    const bool drifts = std::ranges::any_of(
+        result->drifts, [](const Drift& drift) { return drift.since_run == 0; });
+    if (!result->failed() && !drifts) return;
+    Statement good(db_,
+                   "SELECT id, run FROM result WHERE scenario = ? AND run < ? AND "
+                   "status = 'as_expected' ORDER BY run DESC LIMIT 1");
+    if (!good.Bind(scenario, run).Step()) return;
+    result->changes = ChangesOfResult(db_, good.Integer(0), id);
+    const Changes of_run = ChangesOfRun(db_, good.Integer(1), run);
+    result->changes.insert(result->changes.end(), of_run.begin(), of_run.end());
+    if (result->changes.empty()) {
+      result->changes.emplace_back("nothing in limits, input files, program or machine");
+    }
+  }
+
   long InsertResult(long run, long scenario, const CaseResult& result) {
     Statement(db_,
               "INSERT INTO result(run, scenario, status, verdict, exit_code, reason, inputs, "
@@ -345,6 +367,10 @@ class Appender {
                                        [&name = name](const Drift& d) { return d.metric == name; });
       metric.Bind(id, name, value.value, value.limit, value.pass || !value.limit, drifted)
           .Execute();
+    }
+    Statement input(db_, "INSERT OR IGNORE INTO input_file VALUES(?,?,?)");
+    for (const InputFile& file : result.input_files) {
+      input.Bind(result.inputs, file.file, file.fingerprint).Execute();
     }
     Statement drift(db_, "INSERT INTO drift VALUES(?,?,?,?,?,?)");
     for (const Drift& d : result.drifts) {
@@ -465,31 +491,34 @@ using Json = nlohmann::ordered_json;
 struct HistoryRow {
   long result = 0;
   std::string status;
+  std::string key_name;  ///< of the KeyMetric(); "" without one
   double key_value = kNan;
   double wall_s = kNan;
 };
 
-// The value of the result's KeyMetric().
-std::string KeyMetricQuery() {
+// `column` of the result's KeyMetric().
+std::string KeyMetricQuery(const char* column) {
   std::string names, ranks;
   for (size_t i = 0; i < KeyMetricNames().size(); ++i) {
     names += fmt::format("{}'{}'", i == 0 ? "" : ", ", KeyMetricNames()[i]);
     ranks += fmt::format(" WHEN '{}' THEN {}", KeyMetricNames()[i], i);
   }
   return fmt::format(
-      "(SELECT m.value FROM metric m WHERE m.result = r.id AND m.name IN ({}) "
+      "(SELECT m.{} FROM metric m WHERE m.result = r.id AND m.name IN ({}) "
       "ORDER BY CASE m.name{} END LIMIT 1)",
-      names, ranks);
+      column, names, ranks);
 }
 
 std::map<std::string, HistoryRow> RowsOf(Database* database, long run) {
-  Statement select(database, fmt::format("SELECT s.key, r.id, r.status, {}, r.wall_s FROM result r "
-                                         "JOIN scenario s ON s.id = r.scenario WHERE r.run = ?",
-                                         KeyMetricQuery()));
+  Statement select(database,
+                   fmt::format("SELECT s.key, r.id, r.status, {}, {}, r.wall_s FROM result r "
+                               "JOIN scenario s ON s.id = r.scenario WHERE r.run = ?",
+                               KeyMetricQuery("name"), KeyMetricQuery("value")));
   select.Bind(run);
   std::map<std::string, HistoryRow> rows;
   while (select.Step()) {
-    rows[select.Text(0)] = {select.Integer(1), select.Text(2), select.Real(3), select.Real(4)};
+    rows[select.Text(0)] = {select.Integer(1), select.Text(2), select.Text(3), select.Real(4),
+                            select.Real(5)};
   }
   return rows;
 }
@@ -504,35 +533,110 @@ std::string RunLine(Database* database, long run) {
                      label.empty() ? "" : ", " + label, OneLine(select.Text(2)));
 }
 
-std::string CompareRow(Database* database, const std::string& key, const HistoryRow& a,
-                       const HistoryRow& b) {
-  const std::string moved =
-      AttributeMovement(LoadGolden(database, a.result), LoadGolden(database, b.result));
-  const double ratio = b.key_value / a.key_value;
-  const bool same =
-      a.status == b.status && moved.empty() && (a.key_value == b.key_value || std::isnan(ratio));
-  std::string line = fmt::format("  {:<52}{:>10} → {:<10}{:>7.1f} s → {:.1f} s", OneLine(key),
-                                 Value(a.key_value), Value(b.key_value), a.wall_s, b.wall_s);
-  if (same) return line + "  same\n";
+constexpr size_t kFlippedNamed = 3;
+
+// Checks that passed in one run and fail in the other, those farthest above their limit first.
+Changes FlippedChecks(Database* database, long a, long b) {
+  Statement select(database,
+                   "SELECT n.name, o.value, n.value, n.upper_limit, n.pass FROM metric o "
+                   "JOIN metric n ON n.name = o.name WHERE o.result = ? AND n.result = ? AND "
+                   "o.pass <> n.pass ORDER BY n.pass, n.value / n.upper_limit DESC");
+  select.Bind(a, b);
+  Changes changes;
+  size_t more = 0;
+  while (select.Step()) {
+    more += changes.size() == kFlippedNamed ? 1 : 0;
+    if (changes.size() == kFlippedNamed) continue;
+    changes.push_back(fmt::format("{}: {} → {}, limit {}: {}", QuantityText(select.Text(0)),
+                                  Value(select.Real(1)), Value(select.Real(2)),
+                                  Value(select.Real(3)), select.Integer(4) != 0 ? "ok" : "FAIL"));
+  }
+  if (more > 0) changes.push_back(fmt::format("and {} more checks", more));
+  return changes;
+}
+
+// A scenario in both runs, or in one.
+struct Compared {
+  std::string key;
+  const HistoryRow *a = nullptr, *b = nullptr;
+  std::string moved;  ///< which witness
+  Changes checks;     ///< that passed and fail, or the other way round
+  Changes changes;    ///< what else is not the same
+
+  [[nodiscard]] bool changed() const {
+    return a == nullptr || b == nullptr || a->status != b->status || !moved.empty() ||
+           !checks.empty() || !changes.empty() || a->key_name != b->key_name ||
+           IsOther(a->key_value, b->key_value);
+  }
+};
+
+std::vector<Compared> Pair(Database* database, const std::map<std::string, HistoryRow>& rows_a,
+                           const std::map<std::string, HistoryRow>& rows_b) {
+  std::vector<Compared> all;
+  for (const auto& [key, row] : rows_b) {
+    Compared& compared = all.emplace_back();
+    compared.key = key;
+    compared.b = &row;
+    const auto before = rows_a.find(key);
+    if (before == rows_a.end()) continue;
+    compared.a = &before->second;
+    const long a = before->second.result, b = row.result;
+    compared.moved = AttributeMovement(LoadGolden(database, a), LoadGolden(database, b));
+    compared.checks = FlippedChecks(database, a, b);
+    compared.changes = ChangesOfResult(database, a, b);
+  }
+  for (const auto& [key, row] : rows_a) {
+    if (rows_b.contains(key)) continue;
+    Compared& compared = all.emplace_back();
+    compared.key = key;
+    compared.a = &row;
+  }
+  return all;
+}
+
+std::string CompareText(const Compared& compared, long run_a, long run_b) {
+  if (compared.a == nullptr || compared.b == nullptr) {
+    return fmt::format("  {:<52}  only in run {}\n", OneLine(compared.key),
+                       compared.a == nullptr ? run_b : run_a);
+  }
+  const HistoryRow &a = *compared.a, &b = *compared.b;
+  std::string line =
+      fmt::format("  {:<52}{:>10} → {:<10}{:>7.1f} s → {:.1f} s", OneLine(compared.key),
+                  Value(a.key_value), Value(b.key_value), a.wall_s, b.wall_s);
+  if (!compared.changed()) return line + "  same\n";
   if (a.status != b.status) line += fmt::format("  {} → {}", OneLine(a.status), OneLine(b.status));
-  if (std::isfinite(ratio) && ratio != 1.0) line += fmt::format("  ×{:.3g}", ratio);
-  if (!moved.empty()) line += "  " + OneLine(moved);
-  return line + "\n";
+  const double ratio = b.key_value / a.key_value;
+  if (std::isfinite(ratio) && IsOther(a.key_value, b.key_value)) {
+    line += fmt::format("  ×{:.3g}", ratio);
+  }
+  if (!compared.moved.empty()) line += "  " + OneLine(compared.moved);
+  line += "\n";
+  if (!b.key_name.empty() && !b.key_name.ends_with(".force_nrmse")) {
+    line += fmt::format("      the value is: {}\n", OneLine(QuantityText(b.key_name)));
+  }
+  for (const Changes* texts : {&compared.checks, &compared.changes}) {
+    for (const std::string& text : *texts) line += "      " + OneLine(text) + "\n";
+  }
+  return line;
 }
 
 // Null where a run does not have the scenario.
-Json ComparedJson(Database* database, const std::string& key, const HistoryRow* a,
-                  const HistoryRow* b) {
+Json ComparedJson(const Compared& compared) {
   const auto side = [](const HistoryRow* row) {
     if (row == nullptr) return Json();
     return Json({{"status", row->status},
+                 {"quantity", row->key_name.empty() ? "" : QuantityText(row->key_name)},
                  {"force_nrmse", Number(row->key_value)},
                  {"wall_s", Number(row->wall_s)}});
   };
-  Json json = {{"scenario", key}, {"a", side(a)}, {"b", side(b)}};
-  if (a != nullptr && b != nullptr) {
-    json["moved"] =
-        AttributeMovement(LoadGolden(database, a->result), LoadGolden(database, b->result));
+  Json json = {{"scenario", compared.key},
+               {"changed", compared.changed()},
+               {"a", side(compared.a)},
+               {"b", side(compared.b)}};
+  if (compared.a != nullptr && compared.b != nullptr) {
+    json["moved"] = compared.moved;
+    json["checks"] = compared.checks;
+    json["changes"] = compared.changes;
   }
   return json;
 }
@@ -577,8 +681,8 @@ HistoryText ListRuns(const std::string& path) {
   return {text, database.trouble(), Dump({{"runs", std::move(runs)}})};
 }
 
-HistoryText CompareRuns(const std::string& path, const std::string& run_a,
-                        const std::string& run_b) {
+HistoryText CompareRuns(const std::string& path, const std::string& run_a, const std::string& run_b,
+                        bool only_changed) {
   Database database(path, Database::Mode::kRead);
   if (auto trouble = CheckSchema(path, &database); !trouble.empty()) return {"", trouble};
   const long a = FindRun(&database, run_a), b = FindRun(&database, run_b);
@@ -586,23 +690,27 @@ HistoryText CompareRuns(const std::string& path, const std::string& run_a,
     if (id == 0) return {"", fmt::format("history {}: there is no run '{}'", path, name)};
   }
   std::string text = RunLine(&database, a) + RunLine(&database, b);
+  const Changes of_run = ChangesOfRun(&database, a, b);
+  for (const std::string& change : of_run) text += "  " + OneLine(change) + "\n";
   const auto rows_a = RowsOf(&database, a), rows_b = RowsOf(&database, b);
   text += fmt::format("  {:<52}{:>23}{:>18}\n", "scenario", "force error (RMS)", "wall time");
   Json scenarios = Json::array();
-  for (const auto& [key, row] : rows_b) {
-    const auto before = rows_a.find(key);
-    scenarios.push_back(
-        ComparedJson(&database, key, before == rows_a.end() ? nullptr : &before->second, &row));
-    text += before == rows_a.end() ? fmt::format("  {:<52}  only in run {}\n", OneLine(key), b)
-                                   : CompareRow(&database, key, before->second, row);
+  size_t same = 0;
+  for (const Compared& compared : Pair(&database, rows_a, rows_b)) {
+    same += compared.changed() ? 0 : 1;
+    if (only_changed && !compared.changed()) continue;
+    text += CompareText(compared, a, b);
+    scenarios.push_back(ComparedJson(compared));
   }
-  for (const auto& [key, row] : rows_a) {
-    if (rows_b.contains(key)) continue;
-    text += fmt::format("  {:<52}  only in run {}\n", OneLine(key), a);
-    scenarios.push_back(ComparedJson(&database, key, &row, nullptr));
+  if (only_changed) {
+    text += fmt::format("  {} scenario{} without a change\n", same, same == 1 ? "" : "s");
   }
   return {text, database.trouble(),
-          Dump({{"run_a", a}, {"run_b", b}, {"scenarios", std::move(scenarios)}})};
+          Dump({{"run_a", a},
+                {"run_b", b},
+                {"changes", of_run},
+                {"scenarios", std::move(scenarios)},
+                {"same", same}})};
 }
 
 HistoryText HistoryCsv(const std::string& path) {

@@ -40,10 +40,10 @@ struct HistoryText {
 
 /// A table of the runs, newest last.
 [[nodiscard]] HistoryText ListRuns(const std::string& path);
-/// What differs between two runs: status, key metrics, cost, and which witness moved. A run is a
-/// number, "last" or "last~2".
+/// What differs between two runs: status, key metrics, cost, which witness moved, and what else
+/// changed: limits, input files, program. A run is a number, "last" or "last~2".
 [[nodiscard]] HistoryText CompareRuns(const std::string& path, const std::string& run_a,
-                                      const std::string& run_b);
+                                      const std::string& run_b, bool only_changed = false);
 /// One line per run, scenario and metric.
 [[nodiscard]] HistoryText HistoryCsv(const std::string& path);
 /// Takes what run `run` measured as right: baselines start there; what was missing in it is meant
@@ -56,8 +56,8 @@ struct HistoryText {
 
 // Tables of the history.
 
-/// PRAGMA user_version; 1 had no uid of runs, 2 not what they cover.
-inline constexpr int kHistoryVersion = 3;
+/// PRAGMA user_version; 1 had no uid of runs, 2 not what they cover, 3 not which files were read.
+inline constexpr int kHistoryVersion = 4;
 
 /// Makes the tables where they are missing, or what an older file lacks; a newer program's file and
 /// a file with other tables are trouble. Call inside a write

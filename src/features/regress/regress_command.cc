@@ -280,19 +280,20 @@ namespace {
 struct HistoryArguments {
   std::string history = "out/regress/history.sqlite";
   std::string run_a, run_b, csv, scenario, note;
-  JsonOption json;
+  bool changed = false;
+  JsonOption list_json, compare_json;  // each names its own command
 };
 
-int Show(const HistoryText& answer, const HistoryArguments& arguments) {
-  SayText(arguments.json.text(), answer.text);
-  if (answer.trouble.empty()) return arguments.json.Write(answer.json, {{arguments.history, ""}});
+int Show(const HistoryText& answer, const HistoryArguments& arguments, const JsonOption& json) {
+  SayText(json.text(), answer.text);
+  if (answer.trouble.empty()) return json.Write(answer.json, {{arguments.history, ""}});
   Say(stderr, "error: {}\n", answer.trouble);
   return 2;
 }
 
 int Export(const HistoryArguments& arguments) {
   const HistoryText answer = HistoryCsv(arguments.history);
-  if (!answer.trouble.empty()) return Show(answer, arguments);
+  if (!answer.trouble.empty()) return Show(answer, arguments, {});
   if (arguments.csv.empty()) {
     fmt::print("{}", answer.text);
     return 0;
@@ -309,14 +310,19 @@ void AddHistoryCommand(CLI::App* app, int* exit_code) {
   history->require_subcommand(1);
   history->fallthrough();
   CLI::App* list = history->add_subcommand("list", "All runs");
-  list->callback(
-      [arguments, exit_code] { *exit_code = Show(ListRuns(arguments->history), *arguments); });
+  arguments->list_json.AddTo(list);
+  list->callback([arguments, exit_code] {
+    *exit_code = Show(ListRuns(arguments->history), *arguments, arguments->list_json);
+  });
   CLI::App* compare = history->add_subcommand("compare", "What differs between two runs");
   compare->add_option("run1", arguments->run_a, "number, last or last~1")->required();
   compare->add_option("run2", arguments->run_b, "number, last or last~1")->required();
+  compare->add_flag("--changed", arguments->changed, "only scenarios in which something changed");
+  arguments->compare_json.AddTo(compare);
   compare->callback([arguments, exit_code] {
-    *exit_code =
-        Show(CompareRuns(arguments->history, arguments->run_a, arguments->run_b), *arguments);
+    *exit_code = Show(
+        CompareRuns(arguments->history, arguments->run_a, arguments->run_b, arguments->changed),
+        *arguments, arguments->compare_json);
   });
   CLI::App* csv = history->add_subcommand("export", "All metrics of all runs as CSV");
   csv->add_option("--csv", arguments->csv, "write to this file instead of stdout");
@@ -329,12 +335,11 @@ void AddHistoryCommand(CLI::App* app, int* exit_code) {
   accept->callback([arguments, exit_code] {
     *exit_code =
         Show(AcceptRun(arguments->history, arguments->run_a, arguments->scenario, arguments->note),
-             *arguments);
+             *arguments, {});
   });
-  for (CLI::App* asked : {list, compare}) arguments->json.AddTo(asked);
   const char* codes = "0 done, 2 bad input";
   SetFooter(list, {"history list", "history list --history nightly.sqlite"}, codes);
-  SetFooter(compare, {"history compare last~1 last", "history compare 3 7"}, codes);
+  SetFooter(compare, {"history compare last~1 last --changed", "history compare 3 7"}, codes);
   SetFooter(csv, {"history export --csv metrics.csv"}, codes);
   SetFooter(accept, {"history accept last --scenario spr_tripod/default --note \"stiffer legs\""},
             codes);

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <tuple>
 
 #include "features/regress/find_cases.h"
+#include "scenario/checks.h"
 
 namespace mbv {
 namespace {
@@ -59,12 +61,32 @@ double ExcessOf(const CaseResult& result) {
   return worst;
 }
 
+// "; changed since: turn.yaml", or that nothing is known to have; "" without a run to compare with.
+std::string SinceText(const CaseResult& result) {
+  return result.changes.empty() ? ""
+                                : fmt::format("changed since: {}", fmt::join(result.changes, "; "));
+}
+
 }  // namespace
+
+std::string QuantityText(const std::string& check) {
+  const size_t dot = check.rfind('.');
+  if (dot == std::string::npos) return check;
+  const std::string key = check.substr(dot + 1);
+  const MetricRow* row = FindMetric(key);
+  if (row == nullptr) row = FindMetric(key, StiffnessMetricRows());
+  if (row == nullptr) return check;
+  std::string of = check.substr(0, dot);
+  std::replace(of.begin(), of.end(), '_', ' ');
+  const std::string unit = *row->unit == '\0' ? "" : fmt::format(" [{}]", row->unit);
+  return fmt::format("{}{} ({})", row->title, unit, of);
+}
 
 std::string CheckText(const CaseResult& result,
                       const std::pair<const std::string, MetricValue>& check) {
   const auto& [name, metric] = check;
-  std::string text = fmt::format("{} is {:.2e}, limit {:.1e}", name, metric.value, *metric.limit);
+  std::string text =
+      fmt::format("{} is {:.2e}, limit {:.1e}", QuantityText(name), metric.value, *metric.limit);
   if (!metric.channel.empty()) text += ", at " + metric.channel;
   if (std::isfinite(metric.time_s)) {
     text += fmt::format("{}{:.5g} s", metric.channel.empty() ? ", at " : ", ", metric.time_s);
@@ -93,6 +115,7 @@ std::vector<std::string> FailureTexts(const CaseResult& result, size_t most) {
     texts.push_back(
         fmt::format("was never ok in {} earlier run{}", past.runs, past.runs == 1 ? "" : "s"));
   }
+  if (!result.changes.empty()) texts.push_back(SinceText(result));
   return texts;
 }
 
@@ -115,12 +138,13 @@ std::string DriftLine(const CaseResult& result) {
       ++left_out;
     } else {
       further += fmt::format("{}{} {:.0f} times", named++ == 0 ? "; also " : ", ",
-                             drifts[i]->metric, DriftRatio(*drifts[i]));
+                             QuantityText(drifts[i]->metric), DriftRatio(*drifts[i]));
     }
   }
   if (left_out > 0) further += fmt::format(" and {} more", left_out);
   line += further + moved;
   if (!drifts.front()->since.empty()) line += "; since " + drifts.front()->since;
+  if (!result.changes.empty()) line += "; " + SinceText(result);
   return line;
 }
 
@@ -234,6 +258,117 @@ std::vector<MissingCase> FindMissing(Database* database, long run) {
   }
   for (MissingCase& item : missing) item.when = DescribeRun(database, item.last_run);
   return missing;
+}
+
+namespace {
+
+// Which files were read is kept from this version on.
+constexpr long kVersionWithInputs = 4;
+
+constexpr double kNoise = 1e-13;        // as of DriftRule
+constexpr double kOtherByShare = 0.01;  // a value differs
+constexpr size_t kChangesNamed = 6;     // of one kind
+
+std::map<std::string, std::string> PairsOf(Database* database, const std::string& sql, long id) {
+  std::map<std::string, std::string> pairs;
+  Statement select(database, sql);
+  select.Bind(id);
+  while (select.Step()) pairs[select.Text(0)] = select.Text(1);
+  return pairs;
+}
+
+// The first of them, then how many more.
+void AddSome(const Changes& some, Changes* changes) {
+  for (size_t i = 0; i < std::min(some.size(), kChangesNamed); ++i) changes->push_back(some[i]);
+  if (some.size() > kChangesNamed) {
+    changes->push_back(fmt::format("and {} more", some.size() - kChangesNamed));
+  }
+}
+
+Changes LimitChanges(Database* database, long before, long now) {
+  Statement select(database,
+                   "SELECT b.name, a.upper_limit, b.upper_limit FROM metric a JOIN metric b ON "
+                   "b.name = a.name WHERE a.result = ? AND b.result = ? AND "
+                   "a.upper_limit IS NOT b.upper_limit ORDER BY b.name");
+  select.Bind(before, now);
+  Changes changes;
+  const auto text = [](double limit) {
+    return std::isnan(limit) ? std::string("none") : fmt::format("{:.3g}", limit);
+  };
+  while (select.Step()) {
+    changes.push_back(fmt::format("limit of {} was {}, is {}", QuantityText(select.Text(0)),
+                                  text(select.Real(1)), text(select.Real(2))));
+  }
+  return changes;
+}
+
+// By the place of a file, which may be another one on another machine: then by its name.
+Changes InputChanges(Database* database, long before, long now) {
+  const std::string kInputs = "SELECT 'inputs', inputs FROM result WHERE id = ?";
+  const std::string was = PairsOf(database, kInputs, before)["inputs"];
+  const std::string is = PairsOf(database, kInputs, now)["inputs"];
+  if (was == is) return {};
+  Statement version(database, "PRAGMA user_version");
+  std::map<std::string, std::string> a, b;
+  if (version.Step() && version.Integer(0) >= kVersionWithInputs) {
+    const std::string kFiles =
+        "SELECT f.file, f.fingerprint FROM input_file f JOIN result r ON r.inputs = f.inputs "
+        "WHERE r.id = ?";
+    a = PairsOf(database, kFiles, before);
+    b = PairsOf(database, kFiles, now);
+  }
+  if (a.empty() || b.empty()) return {"an input file changed (which one is not in the history)"};
+  const auto name = [](const std::string& file) { return fs::path(file).filename().string(); };
+  Changes changes, gone, added;
+  for (const auto& [file, print] : b) {
+    const auto found = a.find(file);
+    if (found == a.end()) added.push_back(name(file) + " is new");
+    if (found != a.end() && found->second != print) changes.push_back(name(file) + " changed");
+  }
+  for (const auto& [file, print] : a) {
+    if (!b.contains(file)) gone.push_back(name(file) + " is not read any more");
+  }
+  changes.insert(changes.end(), added.begin(), added.end());
+  changes.insert(changes.end(), gone.begin(), gone.end());
+  if (changes.empty()) changes.emplace_back("the order of input files changed");
+  return changes;
+}
+
+}  // namespace
+
+bool IsOther(double before, double now) {
+  if (std::isnan(before) || std::isnan(now)) return std::isnan(before) != std::isnan(now);
+  const double a = std::max(std::abs(before), kNoise), b = std::max(std::abs(now), kNoise);
+  return !(std::abs(a - b) <= kOtherByShare * std::max(a, b));
+}
+
+Changes ChangesOfResult(Database* database, long before, long now) {
+  Changes changes;
+  AddSome(LimitChanges(database, before, now), &changes);
+  AddSome(InputChanges(database, before, now), &changes);
+  return changes;
+}
+
+Changes ChangesOfRun(Database* database, long before, long now) {
+  Changes changes;
+  for (const char* of : {"program", "host"}) {
+    const std::string sql = fmt::format("SELECT '{0}', {0} FROM run WHERE id = ?", of);
+    const std::string was = PairsOf(database, sql, before)[of];
+    const std::string is = PairsOf(database, sql, now)[of];
+    if (was != is) changes.push_back(fmt::format("{} {} → {}", of, was, is));
+  }
+  const std::string kVersions = "SELECT name, version FROM version WHERE run = ?";
+  const auto was = PairsOf(database, kVersions, before), is = PairsOf(database, kVersions, now);
+  Changes versions;
+  for (const auto& [name, version] : is) {
+    const auto found = was.find(name);
+    // The program's own is part of the text above.
+    if (name == "mbverify" || (found != was.end() && found->second == version)) continue;
+    versions.push_back(
+        fmt::format("{} {} → {}", name, found == was.end() ? "(none)" : found->second, version));
+  }
+  AddSome(versions, &changes);
+  return changes;
 }
 
 std::string DescribeRun(Database* database, long run) {

@@ -10,13 +10,18 @@
 
 namespace mbv {
 
-/// "simulated_vs_analytic.force_nrmse is 3.5e-05, limit 1.0e-10, at limb2.drive.force, 7.16 s; was
-/// 1.7e-13 in run 6": a failed check.
+/// The name of a check in the words of the report: "drive force, RMS (simulated vs analytic)".
+/// Names of no metric, as studies have them, stay.
+[[nodiscard]] std::string QuantityText(const std::string& check);
+
+/// "drive force, RMS (simulated vs analytic) is 3.5e-05, limit 1.0e-10, at limb2.drive.force,
+/// 7.16 s; was 1.7e-13 in run 6": a failed check.
 [[nodiscard]] std::string CheckText(const CaseResult& result,
                                     const std::pair<const std::string, MetricValue>& check);
 
 /// What there is to say beside CaseResult::reason: the failed checks, worst first, at most `most`
-/// of them, then when it was last as expected. Empty unless the scenario failed.
+/// of them, then when it was last as expected and what changed since. Empty unless the scenario
+/// failed.
 [[nodiscard]] std::vector<std::string> FailureTexts(const CaseResult& result, size_t most);
 
 /// The reason with the worst check, in one line.
@@ -52,6 +57,16 @@ namespace mbv {
 
 /// Sorted by key. A scenario is missing until it is back, or accepted in a run without it.
 [[nodiscard]] std::vector<MissingCase> FindMissing(Database* database, long run);
+
+/// Whether a metric changed by more than roundoff: by 1 %, where one of both is above 1e-13.
+[[nodiscard]] bool IsOther(double before, double now);
+
+/// What changed between two results beside their numbers: limits, input files ("turn.yaml
+/// changed"). Of histories that did not keep which files were read, that some file changed.
+[[nodiscard]] Changes ChangesOfResult(Database* database, long before, long now);
+
+/// The same of two runs: program, libraries, machine.
+[[nodiscard]] Changes ChangesOfRun(Database* database, long before, long now);
 
 /// "run 6 of 2026-01-30T02:00:00Z, abc123, mbverify 0.1.0 build 0123abcd"; "" if there is none.
 [[nodiscard]] std::string DescribeRun(Database* database, long run);

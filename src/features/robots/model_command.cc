@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "base/json_text.h"
 #include "base/text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
@@ -33,6 +34,7 @@ namespace fs = std::filesystem;
 struct ModelArguments {
   std::string model, format, out, drives;
   std::vector<std::string> set, assembly;
+  JsonOption json;
 };
 
 ModelFormat FormatOf(const std::string& word) {
@@ -51,6 +53,11 @@ ModelDrives DrivesOf(const std::string& word) {
 }
 
 bool IsForPeople(const std::string& format) { return FormatOf(format) == ModelFormat::kMobility; }
+
+// What --json writes, as --format json prints it.
+std::string WithHead(const JsonOption& json, const std::string& text) {
+  return json.Text(ParseJson<nlohmann::ordered_json>(text));
+}
 
 int Model(const ModelArguments& arguments) {
   if (!arguments.drives.empty() && FormatOf(arguments.format) != ModelFormat::kMjcf) {
@@ -90,15 +97,19 @@ int Model(const ModelArguments& arguments) {
   } else {
     text = ModelText(*loaded.mechanism, format, loaded.caveats);
   }
-  if (arguments.out.empty()) {
-    if (!IsForPeople(arguments.format)) {
-      fmt::print("{}", text);
-    } else {
-      SayText(stdout, text);
-    }
-    return 0;
+  if (format == ModelFormat::kJson) text = WithHead(arguments.json, text);
+  int exit_code = 0;
+  if (!arguments.out.empty()) {
+    exit_code = WriteWholeFile(arguments.out, text, inputs.files());
+  } else if (IsForPeople(arguments.format)) {
+    SayText(arguments.json.text(), text);
+  } else {
+    fmt::print(arguments.json.text(), "{}", text);
   }
-  return WriteWholeFile(arguments.out, text, inputs.files());
+  if (!arguments.json.wanted()) return exit_code;
+  return WorseExit(
+      exit_code,
+      arguments.json.Write(ModelText(*loaded.mechanism, ModelFormat::kJson, {}), inputs.files()));
 }
 
 struct CheckArguments {
@@ -231,7 +242,7 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
   model
       ->add_option(
           "--format", arguments->format,
-          "text (mobility report), json (the same for programs), or the model as mjcf, "
+          "text (mobility report), json (the same as --json writes), or the model as mjcf, "
           "urdf, yaml (a model file with the numbers that the parameters give) or mechanism "
           "(mechanism.json, docs/how-to/external_solvers.md)")
       ->check(OneOf({"text", "json", "mjcf", "urdf", "yaml", "mechanism"}));
@@ -241,13 +252,15 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
                    "default) or servo (position and velocity servos, tuned for the home pose)")
       ->check(OneOf({"free", "held", "servo"}));
   model->add_option("--out", arguments->out, "write to this file instead of stdout");
+  arguments->json.AddTo(model);
   model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
       ->allow_extra_args(false);
   AddAssemblyOption(model, &arguments->assembly);
   SetFooter(model,
             {"model stabilizing_platform", "model four_bar --set crank=0.16",
              "model spr_tripod --format mjcf --out spr_tripod.xml",
-             "model scara_robot --format mjcf --drives servo --out scara_robot.xml"},
+             "model scara_robot --format mjcf --drives servo --out scara_robot.xml",
+             "model spr_tripod --json mobility.json"},
             "0 done, 2 bad input");
   model->callback([arguments, exit_code] { *exit_code = Model(*arguments); });
 }

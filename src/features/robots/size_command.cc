@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "base/json_text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/options.h"
@@ -28,25 +29,43 @@ struct Sized {
   std::string mechanism;
   std::vector<std::string> scenarios;
   std::vector<MotorEnvelope> envelopes;
+  nlohmann::ordered_json refused = nlohmann::ordered_json::array();
 };
+
+// A scenario that says nothing about motors: the reason is kept for --json.
+int RefuseScenario(const std::string& file, const std::string& reason, const std::string& hint,
+                   Sized* sized) {
+  sized->refused.push_back({{"scenario_file", file}, {"exit_code", 2}, {"reason", reason}});
+  return hint.empty() ? 2 : Refuse(reason, hint);
+}
+
+std::string FirstError(const RunOutcome& outcome) {
+  for (const Finding& finding : outcome.diagnostics.findings()) {
+    if (finding.severity == Severity::kError) return finding.message;
+  }
+  return "";
+}
 
 // Runs a scenario without files; its exit code.
 int AddScenario(const std::string& file, const RunOptions& options, Sized* sized) {
   const RunOutcome outcome = RunScenario(file, options);
   SayText(stderr, outcome.diagnostics.Text());
   if (!outcome.report) {
-    if (outcome.exit_code == 2) return 2;
-    return Refuse(file + " is not a motion", "size takes scenarios with a motion");
+    if (outcome.exit_code == 2) return RefuseScenario(file, FirstError(outcome), "", sized);
+    return RefuseScenario(file, file + " is not a motion", "size takes scenarios with a motion",
+                          sized);
   }
   const Report& report = *outcome.report;
   if (!sized->mechanism.empty() && sized->mechanism != report.mechanism) {
-    return Refuse(fmt::format("{} is about {}, the others about {}", file, report.mechanism,
-                              sized->mechanism),
-                  "size compares scenarios of one mechanism");
+    return RefuseScenario(file,
+                          fmt::format("{} is about {}, the others about {}", file, report.mechanism,
+                                      sized->mechanism),
+                          "size compares scenarios of one mechanism", sized);
   }
   if (report.motors.empty()) {
-    return Refuse(fmt::format("{} has no motors", report.mechanism),
-                  "state them in the model: motors: {DRIVE: {continuous: …, peak: …}}");
+    return RefuseScenario(file, fmt::format("{} has no motors", report.mechanism),
+                          "state them in the model: motors: {DRIVE: {continuous: …, peak: …}}",
+                          sized);
   }
   sized->mechanism = report.mechanism;
   sized->scenarios.push_back(report.scenario);
@@ -68,11 +87,13 @@ bool IsUnknown(const Sized& sized) {
 }
 
 int PrintSized(const SizeArguments& arguments, const Sized& sized, int exit_code) {
-  SayText(arguments.json.text(), ToText(sized.envelopes));
-  const std::string json = ToJson(sized.envelopes, sized.scenarios);
-  if (const int code = arguments.json.Write(json, {}); code != 0) return code;
-  if (TooSmall(sized, arguments.margin)) return WorseExit(exit_code, 1);
-  return WorseExit(exit_code, IsUnknown(sized) ? 3 : 0);
+  if (!sized.envelopes.empty()) SayText(arguments.json.text(), ToText(sized.envelopes));
+  if (TooSmall(sized, arguments.margin)) exit_code = WorseExit(exit_code, 1);
+  if (IsUnknown(sized)) exit_code = WorseExit(exit_code, 3);
+  auto json = ParseJson<nlohmann::ordered_json>(ToJson(sized.envelopes, sized.scenarios));
+  json["refused"] = sized.refused;
+  json["exit_code"] = exit_code;
+  return WorseExit(exit_code, arguments.json.Write(json, {}));
 }
 
 int RunSize(const SizeArguments& arguments) {
@@ -92,7 +113,7 @@ int RunSize(const SizeArguments& arguments) {
   for (const std::string& file : files) {
     exit_code = WorseExit(exit_code, AddScenario(file, options, &sized));
   }
-  return sized.envelopes.empty() ? exit_code : PrintSized(arguments, sized, exit_code);
+  return PrintSized(arguments, sized, exit_code);
 }
 
 }  // namespace

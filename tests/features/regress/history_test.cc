@@ -8,6 +8,8 @@
 #include <thread>
 
 #include "features/regress/database.h"
+#include "features/regress/summaries.h"
+#include "features/regress/trouble_text.h"
 #include "tests/features/regress/regress_fixture.h"
 
 namespace mbv {
@@ -280,7 +282,104 @@ TEST_F(HistoryTest, FilesOfTheFirstSchemaGoOn) {
   EXPECT_EQ(ListRuns(kFile).trouble, "");
   EXPECT_EQ(CheckHistory(kFile), "");
   EXPECT_EQ(Night(2e-9).run.id, 2);
-  EXPECT_EQ(Count("PRAGMA user_version"), 3);
+  EXPECT_EQ(Count("PRAGMA user_version"), kHistoryVersion);
+}
+
+// A scenario whose limit, file and program are stated.
+RegressReport Judged(double nrmse, double limit, const std::string& turn,
+                     const std::string& program = "mbverify 0.1.0 build 0123abcd") {
+  CaseResult result = AgreeingCase("model/case", nrmse);
+  result.metrics["simulated_vs_analytic.force_nrmse"] = {nrmse, limit, nrmse <= limit};
+  if (nrmse > limit) result.status = CaseStatus::kUnexpected;
+  result.inputs = turn;
+  result.input_files = {{"models/model/model.yaml", "m"}, {"scenarios/model/turn.yaml", turn}};
+  RegressReport report = OneRun({result, AgreeingCase("model/other", 1e-9)});
+  report.run.program = program;
+  EXPECT_EQ(AppendRun(kFile, {}, &report), "");
+  return report;
+}
+
+TEST_F(HistoryTest, WhatFailsReportsWhatChangedSinceTheLastGoodRun) {
+  Judged(3e-7, 1e-6, "old");
+  EXPECT_EQ(Judged(3e-7, 1e-7, "old").cases.front().changes,
+            Changes{"limit of drive force, RMS (simulated vs analytic) was 1e-06, is 1e-07"});
+  // Against the good run, not against the last one.
+  const RegressReport third = Judged(3e-7, 1e-7, "new", "mbverify 0.1.0 build 4567cdef");
+  EXPECT_EQ(third.cases.front().changes,
+            (Changes{"limit of drive force, RMS (simulated vs analytic) was 1e-06, is 1e-07",
+                     "turn.yaml changed",
+                     "program mbverify 0.1.0 build 0123abcd → mbverify 0.1.0 build 4567cdef"}));
+  EXPECT_TRUE(third.cases.back().changes.empty()) << "it is as expected";
+  const auto texts = FailureTexts(third.cases.front(), 1);
+  EXPECT_NE(texts.back().find("changed since: limit of drive force"), std::string::npos);
+  EXPECT_NE(ToJUnit(third).find("; turn.yaml changed; program mbverify"), std::string::npos);
+  EXPECT_EQ(ReportFromJson(ToJson(third))->cases.front().changes, third.cases.front().changes);
+  // It grew, and nothing that is known of it changed.
+  EXPECT_EQ(Judged(3e-6, 1e-6, "old").cases.front().changes,
+            Changes{"nothing in limits, input files, program or machine"});
+}
+
+TEST_F(HistoryTest, DriftReportsWhatChangedInTheRunItBegan) {
+  for (int i = 0; i < 4; ++i) Judged(1e-9, 1e-6, "old");
+  const RegressReport drifted = Judged(1e-7, 1e-6, "new");
+  EXPECT_EQ(drifted.cases.front().changes, Changes{"turn.yaml changed"});
+  EXPECT_TRUE(DriftLine(drifted.cases.front()).ends_with("; changed since: turn.yaml changed"));
+  EXPECT_TRUE(Judged(1e-7, 1e-6, "new").cases.front().changes.empty()) << "it began before";
+}
+
+TEST_F(HistoryTest, CompareNamesWhatChangedBesideTheNumbers) {
+  Judged(3e-7, 1e-6, "old");
+  Judged(3e-7, 1e-7, "new", "mbverify 0.1.0 build 4567cdef");
+  const std::string all = CompareRuns(kFile, "1", "2").text;
+  for (const char* part :
+       {"\n  program mbverify 0.1.0 build 0123abcd → mbverify 0.1.0 build 4567cdef\n",
+        "as_expected → unexpected\n",
+        "\n      drive force, RMS (simulated vs analytic): 3.00e-07 → 3.00e-07, limit 1.00e-07: "
+        "FAIL\n",
+        "\n      limit of drive force, RMS (simulated vs analytic) was 1e-06, is 1e-07\n",
+        "\n      turn.yaml changed\n", "model/other", "same\n"}) {
+    EXPECT_NE(all.find(part), std::string::npos) << part << "\n" << all;
+  }
+  const HistoryText changed = CompareRuns(kFile, "1", "2", /*only_changed=*/true);
+  EXPECT_EQ(changed.text.find("model/other"), std::string::npos) << changed.text;
+  EXPECT_NE(changed.text.find("model/case"), std::string::npos);
+  EXPECT_NE(changed.text.find("1 scenario without a change"), std::string::npos) << changed.text;
+  EXPECT_EQ(changed.json.find("simulated_vs_analytic"), std::string::npos) << changed.json;
+  EXPECT_EQ(CompareRuns(kFile, "1", "1", true).text.find("model/case"), std::string::npos);
+}
+
+TEST_F(HistoryTest, RoundoffIsNoChange) {
+  EXPECT_FALSE(IsOther(1e-15, 9e-14));
+  EXPECT_FALSE(IsOther(1e-9, 1.005e-9));
+  EXPECT_TRUE(IsOther(1e-9, 1.02e-9));
+  EXPECT_TRUE(IsOther(kNan, 1.0));
+  EXPECT_FALSE(IsOther(kNan, kNan));
+}
+
+// Version 3 did not keep which files were read: the comparison goes on without writing, and a run
+// that is added takes the file over.
+TEST_F(HistoryTest, AHistoryWithoutInputFilesIsComparedAndTakenOver) {
+  Judged(3e-7, 1e-6, "old");
+  Judged(3e-7, 1e-7, "new");
+  {
+    Database database(kFile, Database::Mode::kWrite);
+    database.Run("DROP TABLE input_file");
+    database.Run("PRAGMA user_version = 3");
+    ASSERT_EQ(database.trouble(), "");
+  }
+  const HistoryText compared = CompareRuns(kFile, "1", "2");
+  EXPECT_EQ(compared.trouble, "");
+  EXPECT_NE(compared.text.find("an input file changed (which one is not in the history)"),
+            std::string::npos)
+      << compared.text;
+  EXPECT_NE(compared.text.find("was 1e-06, is 1e-07"), std::string::npos);
+  EXPECT_EQ(Count("PRAGMA user_version"), 3) << "reading changes nothing";
+  EXPECT_EQ(Judged(3e-7, 1e-7, "newer").cases.front().changes.back(),
+            "an input file changed (which one is not in the history)");
+  EXPECT_EQ(Count("PRAGMA user_version"), kHistoryVersion);
+  EXPECT_NE(CompareRuns(kFile, "2", "3").text.find("an input file changed"), std::string::npos);
+  Judged(3e-7, 1e-7, "newest");
+  EXPECT_NE(CompareRuns(kFile, "3", "4").text.find("turn.yaml changed"), std::string::npos);
 }
 
 // A regression over whole folders, of scenarios that agree.

@@ -91,8 +91,8 @@ TEST(Summaries, WhatWasNotJudgedNeitherAgreesNorFails) {
 TEST(Summaries, AFailureNamesCheckValueLimitPlaceAndTheLastGoodRun) {
   for (const auto& [where, text] : AllSummaries(Mixed())) {
     for (const char* part :
-         {"simulated_vs_analytic.force_nrmse is 1.00e-03, limit 1.0e-06, at limb2.drive.force, "
-          "7.16 s; was 1.70e-13 in run 6",
+         {"drive force, RMS (simulated vs analytic) is 1.00e-03, limit 1.0e-06, at "
+          "limb2.drive.force, 7.16 s; was 1.70e-13 in run 6",
           "was ok in run 6 of 2026-01-29T02:00:00Z, abc122"}) {
       EXPECT_NE(WithoutBackslashes(text).find(part), std::string::npos) << where << "\n" << text;
     }
@@ -199,6 +199,28 @@ TEST(Summaries, AnOutputsPlaceOrElseVelocitiesAreTheKeyMetricOfAFreeMotion) {
   EXPECT_EQ(KeyText(result), "3.3e-12 of 1.0e-05 (velocity, simulated vs reference)");
 }
 
+TEST(Summaries, QuantitiesHaveTheWordsOfTheReport) {
+  EXPECT_EQ(QuantityText("simulated_vs_reference.pose_m"),
+            "output position [m] (simulated vs reference)");
+  EXPECT_EQ(QuantityText("simulated.closure_m"), "loop gap [m] (simulated)");
+  EXPECT_EQ(QuantityText("simulated_vs_analytic.stiffness_entry"),
+            "stiffness, worst entry (simulated vs analytic)");
+  EXPECT_EQ(QuantityText("validation.motor"), "validation.motor") << "a study's, no metric";
+}
+
+TEST(JUnit, HasASuitePerModel) {
+  RegressReport report = OneRun(
+      {AgreeingCase("a/x", 1e-9), AgreeingCase("a/must_fail/y", 1e-9), AgreeingCase("b/x", 1e-9)});
+  tinyxml2::XMLDocument document;
+  ASSERT_EQ(document.Parse(ToJUnit(report).c_str()), tinyxml2::XML_SUCCESS);
+  const auto* suite = document.FirstChildElement("testsuites")->FirstChildElement("testsuite");
+  EXPECT_STREQ(suite->Attribute("name"), "a");
+  EXPECT_EQ(suite->IntAttribute("tests"), 2);
+  suite = suite->NextSiblingElement("testsuite");
+  EXPECT_STREQ(suite->Attribute("name"), "b");
+  EXPECT_EQ(suite->NextSiblingElement(), nullptr);
+}
+
 TEST(JUnit, CountsMatchItsElements) {
   tinyxml2::XMLDocument document;
   ASSERT_EQ(document.Parse(ToJUnit(Mixed()).c_str()), tinyxml2::XML_SUCCESS);
@@ -269,7 +291,7 @@ TEST(JUnit, AwkwardTextArrivesUnchanged) {
   ASSERT_NE(failure, nullptr);
   EXPECT_STREQ(failure->Attribute("message"),
                "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ\uFFFD; "
-               "simulated_vs_analytic.force_nrmse is 1.00e-03, limit 1.0e-06, at "
+               "drive force, RMS (simulated vs analytic) is 1.00e-03, limit 1.0e-06, at "
                "limb2.drive.force, 7.16 s; was 1.70e-13 in run 6");
   EXPECT_TRUE(std::string(failure->GetText()).ends_with("line 1\nline 2 \uFFFD <b>"))
       << failure->GetText();
