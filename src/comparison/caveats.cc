@@ -23,7 +23,7 @@ bool IsWide(const CheckResult& check) { return check.limit && *check.limit > 1.0
 bool IsCoarse(const ComparisonInput& input, const CheckResult& check) {
   // A limit that a table's uncertainty widened is judged with the table, one that perturbed forces
   // set by how much these show.
-  if (!check.limit || (check.stated_limit && !input.motion->free())) return false;
+  if (!check.limit || (check.stated_limit && !check.limit_is_integration_error)) return false;
   if (check.metric == Metric::kTableTube || check.metric == Metric::kMotorUse) {
     return IsWide(check);
   }
@@ -44,6 +44,20 @@ bool ZeroPasses(const Comparison& comparison, const CheckResult& check) {
   if (!check.limit || !IsDriveForce(check.metric)) return false;
   const Measured* measured = MeasuredOf(comparison, check);
   return measured != nullptr && measured->of_zero < 1.0 && measured->of_zero <= *check.limit;
+}
+
+// Limits below what the reference claims of itself: what is smaller is not seen.
+Caveat IntegrationErrors(const ComparisonInput& input, const Comparison& comparison) {
+  Caveat caveat{.kind = CaveatKind::kWideLimits};
+  for (const CheckResult& check : comparison.checks) {
+    if (check.limit_is_integration_error) caveat.of.push_back(check.name);
+  }
+  if (caveat.of.empty()) return caveat;
+  caveat.text = fmt::format(
+      "the reference states an error of its trajectory of {:.1e} [rad, characteristic lengths], "
+      "which is above the limit and replaces it: {}",
+      input.integration_error, Joined(caveat.of));
+  return caveat;
 }
 
 bool Judges(const ComparisonInput& input, const CheckResult& check) {
@@ -164,7 +178,7 @@ std::string ForcesLeftOut(const ComparisonInput& input, const Witness& witness) 
 
 }  // namespace
 
-void MarkBlind(const ComparisonInput& input, Comparison* comparison) {
+void MarkInsensitive(const ComparisonInput& input, Comparison* comparison) {
   for (CheckResult& check : comparison->checks) {
     const PairComparison* pair = comparison->FindPair(check.subject);
     if (check.metric == Metric::kMotorUse) {
@@ -270,6 +284,9 @@ std::vector<Caveat> CaveatsOf(const ComparisonInput& input, const Comparison& co
   std::vector<Caveat> all = sentences.Take();
   for (const std::string& text : input.left_out) {
     all.push_back(LeftOutCaveat(text));
+  }
+  if (Caveat own = IntegrationErrors(input, comparison); !own.of.empty()) {
+    all.insert(all.begin(), std::move(own));
   }
   if (Caveat coarse = CoarseLimits(input, comparison); !coarse.of.empty()) {
     coarse.text = "limits so wide that they verify nothing: " + coarse.text;

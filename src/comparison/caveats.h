@@ -11,7 +11,7 @@ namespace mbv {
 /// Sets `insensitive` of the checks that verify nothing although they may pass: limits coarser than
 /// kCoarsestLimit, drive forces that vanish because nothing moves, weighs or exerts a force, and
 /// motors over samples that do not resolve the motion.
-void MarkBlind(const ComparisonInput& input, Comparison* comparison);
+void MarkInsensitive(const ComparisonInput& input, Comparison* comparison);
 
 /// Why no check of drive forces (of a free motion: of where it leads) verified anything; "" if one
 /// did.

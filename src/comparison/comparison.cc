@@ -236,8 +236,8 @@ void AddPair(const ComparisonInput& input, const std::string& measured, const st
     LeaveOutReachedMotion(&pair);
   }
   OtherLimits other;
-  other.integrated =
-      input.motion->free() && (measured == role::kReference || truth == role::kReference);
+  const Role& solves = input.table == nullptr ? role::kReference : role::kSolver;
+  other.integrated = measured == solves || truth == solves;
   if (pair.compared && SharesForces(input, measured, truth)) {
     other.growth = GrowthLimits(input, *a->trace);
   }
@@ -595,7 +595,7 @@ Comparison Compare(const ComparisonInput& given) {
   }
   AddNotCompared(input, &comparison);
   if (input.table != nullptr) FinishTable(input, &comparison);
-  MarkBlind(input, &comparison);
+  MarkInsensitive(input, &comparison);
   Judge(input, &comparison);
   comparison.caveats = CaveatsOf(input, comparison);
   comparison.attribution = Attribute(input, comparison);

@@ -85,8 +85,9 @@ struct ComparisonInput {
   DriveMode mode = DriveMode::kPrescribedMotion;  ///< what moves the simulation's drives (driven.h)
   const Trace* perturbed = nullptr;  ///< force-driven: the same run with perturbed forces
   double perturbation = kNan;        ///< by this share of their RMS
-  /// Of a free motion: how far the reference's trajectory is from the exact one, as it states
-  /// itself, lengths over the characteristic length [1]. NaN if it states nothing.
+  /// Of a free motion: how far the trajectory of the reference (beside a table, of the solver) is
+  /// from the exact one, as it states itself, lengths over the characteristic length [1]. NaN if it
+  /// states nothing.
   double integration_error = kNan;
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
@@ -202,7 +203,8 @@ struct CheckResult {
   /// Set where `limit` is not the scenario's own but what a table's uncertainty allows, or how far
   /// perturbed forces set it.
   std::optional<double> stated_limit;
-  std::string limit_by;  ///< what `limit` comes from then
+  std::string limit_by;                     ///< what `limit` comes from then
+  bool limit_is_integration_error = false;  ///< of the reference, as it states it
   bool pass = false;
   /// Compares a drive motion with itself: it can fail, but that it passes verifies nothing.
   bool follows = false;

@@ -347,6 +347,7 @@ void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckRes
     check->stated_limit = check->limit;
     check->limit = error;
     check->limit_by = "the error that the reference states of itself";
+    check->limit_is_integration_error = true;
   }
 }
 

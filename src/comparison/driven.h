@@ -42,7 +42,7 @@ namespace mbv {
 struct OtherLimits {
   std::map<Metric, double> tubes;   ///< a table's own uncertainty: the wider of it and the limit
   std::map<Metric, double> growth;  ///< by perturbed forces: counts instead of the limit
-  bool integrated = false;          ///< one of both is the reference of a free motion
+  bool integrated = false;          ///< one of both states ComparisonInput::integration_error
 };
 void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check);
 

@@ -244,7 +244,6 @@ class Sight {
     plain.output_frames = false;
     for (const Item& item : MechanismItems(mechanism, frame, scale, plain)) {
       const bool glass = item.material.rgba[3] < 0.5F;
-      if (item.framing == Framing::kNever && !glass) continue;
       Vec3 high = item.size;
       if (item.solid == Solid::kCapsule) high.z() += item.size.x();
       scene.blockers.push_back(

@@ -37,6 +37,7 @@ std::string LoadGl(const char* library) {
   loaded = true;
   return "";
 }
+
 namespace {
 
 GLuint CompiledShader(GLenum kind, const std::string& source) {

@@ -79,10 +79,10 @@ TEST(Text, WhatIsNotATextIsReplacedInMarkup) {
 
 TEST(Diagnostics, EachFindingIsReportedOnce) {
   Diagnostics list, other;
-  const Finding finding{Severity::kWarning, "a.yaml", 1, 1, "odd", "mend it"};
+  const Finding finding{Severity::kWarning, "a.yaml", 1, 1, "odd", "correct it"};
   list.Add(finding);
   other.Add(finding);
-  other.Add({Severity::kWarning, "a.yaml", 2, 1, "odd", "mend it"});
+  other.Add({Severity::kWarning, "a.yaml", 2, 1, "odd", "correct it"});
   list.Append(other);
   EXPECT_EQ(list.findings().size(), 2u);
 }

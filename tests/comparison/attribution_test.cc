@@ -7,8 +7,8 @@
 namespace mbv {
 namespace {
 
-using synthetic::Bend;
 using synthetic::Case;
+using synthetic::Perturb;
 using synthetic::Stretch;
 
 bool Mentions(const Attribution& attribution, const std::string& text) {
@@ -34,7 +34,7 @@ TEST(Attribution, AWrongReferenceStandsAgainstTwo) {
 
 TEST(Attribution, AWrongSimulationStandsAgainstTwo) {
   Case c;
-  Bend(&c.simulated, "d1.force", 0.1);
+  Perturb(&c.simulated, "d1.force", 0.1);
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "simulated");
   EXPECT_TRUE(Mentions(attribution, "reference and analytic agree to")) << attribution.text;
@@ -57,7 +57,7 @@ TEST(Attribution, AConstantFactorIsRecognised) {
 TEST(Attribution, TheEnginesOwnErrorDoesNotHideAWrongClosedForm) {
   Case c;
   c.column = LimitColumn::kForward;
-  Bend(&c.simulated, "d1.force", 0.1);     // 1e-3: fails against both
+  Perturb(&c.simulated, "d1.force", 0.1);  // 1e-3: fails against both
   Stretch(&c.analytic, "d1.force", 1.05);  // 5e-2
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "analytic");
@@ -96,8 +96,8 @@ TEST(Attribution, WrongDrivePositionsAreSeenInTheSimulatedPose) {
   Case c;
   c.CommandPlate();
   // The closed form's drive motion is off by 1 mm; the simulation follows it and misses the pose.
-  for (Trace* trace : {&c.analytic, &c.simulated}) Bend(trace, "d1.position", 1e-3);
-  Bend(&c.simulated, "plate.x", 1e-3);
+  for (Trace* trace : {&c.analytic, &c.simulated}) Perturb(trace, "d1.position", 1e-3);
+  Perturb(&c.simulated, "plate.x", 1e-3);
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "analytic");
   EXPECT_TRUE(Mentions(attribution, "misses the commanded motion by 0.001 m")) << attribution.text;
@@ -106,7 +106,7 @@ TEST(Attribution, WrongDrivePositionsAreSeenInTheSimulatedPose) {
 TEST(Attribution, AWrongSimulatedModelIsReportedFromWrongDriveMotion) {
   Case c;
   c.CommandPlate();
-  Bend(&c.simulated, "plate.x", 1e-3);  // the drive motion is right in all three
+  Perturb(&c.simulated, "plate.x", 1e-3);  // the drive motion is right in all three
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "simulated");
   EXPECT_TRUE(Mentions(attribution, "agree on the drive motion")) << attribution.text;
@@ -118,9 +118,9 @@ TEST(Attribution, WrongDriveAccelerationsAreSeenInTheSimulatedAccelerationNotBla
   // blame.
   Case c;
   c.CommandPlate();
-  for (Trace* trace : {&c.analytic, &c.simulated}) Bend(trace, "d1.acceleration", 1.0);
-  Bend(&c.simulated, "plate.x.acceleration", 1.0);
-  Bend(&c.simulated, "d1.force", 5.0);
+  for (Trace* trace : {&c.analytic, &c.simulated}) Perturb(trace, "d1.acceleration", 1.0);
+  Perturb(&c.simulated, "plate.x.acceleration", 1.0);
+  Perturb(&c.simulated, "d1.force", 5.0);
   c.limits[Metric::kDerivatives] = {};
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "analytic") << attribution.text;
@@ -135,9 +135,9 @@ TEST(Attribution, GuidanceThatHidesAWrongAccelerationLeavesItsPlaceToTell) {
   Case c;
   c.CommandPlate();
   c.column = LimitColumn::kForward;
-  Bend(&c.analytic, "d1.acceleration", 1.0);
-  Bend(&c.simulated, "d1.force", 5.0);
-  Bend(&c.simulated, "plate.x", 1e-4);
+  Perturb(&c.analytic, "d1.acceleration", 1.0);
+  Perturb(&c.simulated, "d1.force", 5.0);
+  Perturb(&c.simulated, "plate.x", 1e-4);
   c.limits[Metric::kDerivatives] = {};
   EXPECT_EQ(c.Run().attribution.odd_one_out, "analytic") << c.Run().attribution.text;
 }
@@ -145,7 +145,7 @@ TEST(Attribution, GuidanceThatHidesAWrongAccelerationLeavesItsPlaceToTell) {
 TEST(Attribution, AWrongReferenceMotionIsReportedByTheSimulationThatMeetsTheCommand) {
   Case c;
   c.CommandPlate();
-  Bend(&c.reference, "d1.acceleration", 1.0);
+  Perturb(&c.reference, "d1.acceleration", 1.0);
   Stretch(&c.reference, "d1.force", 1.05);
   c.limits[Metric::kDerivatives] = {};
   const Attribution attribution = c.Run().attribution;
@@ -156,14 +156,14 @@ TEST(Attribution, AWrongReferenceMotionIsReportedByTheSimulationThatMeetsTheComm
 TEST(Attribution, AnotherAssemblyThatMeetsTheCommandLeavesItOpenAWrongLengthDoesNot) {
   Case c;
   c.CommandPlate();
-  Bend(&c.reference, "d1.position", 0.2);
+  Perturb(&c.reference, "d1.position", 0.2);
   const Attribution far = c.Run().attribution;
   EXPECT_EQ(far.odd_one_out, "");
   EXPECT_TRUE(Mentions(far, "another assembly of the same mechanism, or wrong lengths"))
       << far.text;
   Case near;
   near.CommandPlate();
-  Bend(&near.reference, "d1.position", 1e-4);
+  Perturb(&near.reference, "d1.position", 1e-4);
   const Attribution length = near.Run().attribution;
   EXPECT_EQ(length.odd_one_out, "reference") << length.text;
   EXPECT_FALSE(Mentions(length, "assembly")) << length.text;
@@ -172,8 +172,8 @@ TEST(Attribution, AnotherAssemblyThatMeetsTheCommandLeavesItOpenAWrongLengthDoes
 TEST(Attribution, ADifferenceOfTheDriveMotionsThatIsNothingBesideTheMissIsNotItsCause) {
   Case c;
   c.CommandPlate();
-  Bend(&c.reference, "d1.position", 1e-9);  // ten times the limit
-  Bend(&c.simulated, "plate.x", 1e-3);
+  Perturb(&c.reference, "d1.position", 1e-9);  // ten times the limit
+  Perturb(&c.simulated, "plate.x", 1e-3);
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "simulated") << attribution.text;
   EXPECT_TRUE(Mentions(attribution, "agree on the drive motion to 1e-09 m")) << attribution.text;
@@ -183,7 +183,7 @@ TEST(Attribution, AMissOfTheSimulationDoesNotHideWrongForcesOfTheClosedForm) {
   Case c;
   c.CommandPlate();
   c.column = LimitColumn::kForward;
-  Bend(&c.simulated, "plate.x", 2e-6);
+  Perturb(&c.simulated, "plate.x", 2e-6);
   Stretch(&c.analytic, "d1.force", 1.05);
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "analytic") << attribution.text;
@@ -192,7 +192,7 @@ TEST(Attribution, AMissOfTheSimulationDoesNotHideWrongForcesOfTheClosedForm) {
 
 TEST(Attribution, ASimulationThatDoesNotFollowIsNamed) {
   Case c;
-  Bend(&c.simulated, "d1.acceleration", 1.0);
+  Perturb(&c.simulated, "d1.acceleration", 1.0);
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "simulated") << attribution.text;
   EXPECT_TRUE(Mentions(attribution, "does not follow the motion")) << attribution.text;
@@ -200,7 +200,7 @@ TEST(Attribution, ASimulationThatDoesNotFollowIsNamed) {
 
 TEST(Attribution, AnOpenLoopIsNamedWhenForcesAgree) {
   Case c;
-  Bend(&c.simulated, "closure.position", 1e-3);
+  Perturb(&c.simulated, "closure.position", 1e-3);
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "simulated");
   EXPECT_TRUE(Mentions(attribution, "loop gap is 0.001 m")) << attribution.text;
@@ -209,7 +209,7 @@ TEST(Attribution, AnOpenLoopIsNamedWhenForcesAgree) {
 TEST(Attribution, AHintIsAboutTheWorstDrive) {
   Case c;
   Stretch(&c.analytic, "d1.force", 1.0 / 1.01);  // constant ratio, 0.7 N RMS
-  Bend(&c.analytic, "d2.force", 20.0, 50);       // worst, and no factor
+  Perturb(&c.analytic, "d2.force", 20.0, 50);    // worst, and no factor
   const Attribution attribution = c.Run().attribution;
   EXPECT_TRUE(Mentions(attribution, "worst at d2.force")) << attribution.text;
   EXPECT_FALSE(Mentions(attribution, "ratio")) << attribution.text;
@@ -245,13 +245,14 @@ TEST(Attribution, AUnitIsNamedOnlyWhereTheFactorIsOne) {
 
 TEST(Attribution, ACommandThatAllMissAlikeIsNobodysAlone) {
   Case c;
-  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) Bend(trace, "d2.position", 2e-9);
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated})
+    Perturb(trace, "d2.position", 2e-9);
   const Attribution all = c.Run().attribution;
   EXPECT_EQ(all.odd_one_out, "");
   EXPECT_TRUE(Mentions(all, "agree with each other that the mechanism misses the commanded motion"))
       << all.text;
   Case one;
-  Bend(&one.reference, "d2.position", 2e-9);
+  Perturb(&one.reference, "d2.position", 2e-9);
   EXPECT_EQ(one.Run().attribution.odd_one_out, "reference") << one.Run().attribution.text;
 }
 
@@ -294,7 +295,7 @@ TEST(Attribution, AnEnergyDriftIsBlamedOnlyForWhatItExplains) {
 TEST(Attribution, ASplitIsStatedWithBothAmounts) {
   Case c;
   Stretch(&c.reference, "d1.force", 1.001);
-  Bend(&c.simulated, "d1.force", 1e-9);
+  Perturb(&c.simulated, "d1.force", 1e-9);
   const Attribution attribution = c.Run().attribution;
   ASSERT_TRUE(attribution.split);
   EXPECT_EQ(attribution.split->agree, (std::vector<std::string>{"simulated", "analytic"}));
@@ -339,7 +340,7 @@ TEST(Attribution, ADriveMotionThatNothingConfirmsIsWhatTheyHaveInCommon) {
                                 Metric::kCommandAcceleration, Metric::kDerivatives}) {
       if (!judged) c.limits[metric] = {};
     }
-    Bend(&c.reference, "d1.acceleration", other_motion);
+    Perturb(&c.reference, "d1.acceleration", other_motion);
     Stretch(&c.reference, "d1.force", 1.05);
     return c.Run().attribution;
   };

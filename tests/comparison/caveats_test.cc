@@ -8,8 +8,8 @@
 namespace mbv {
 namespace {
 
-using synthetic::Bend;
 using synthetic::Case;
+using synthetic::Perturb;
 using synthetic::Stretch;
 
 bool Has(const std::vector<Caveat>& caveats, const std::string& part) {
@@ -114,10 +114,10 @@ TEST(Caveats, NothingMovesAndNothingWeighsVerifiesNothing) {
   EXPECT_NE(comparison.reason.find("nothing moves, weighs or exerts a force"), std::string::npos)
       << comparison.reason;
   Case round = Weightless();
-  Bend(&round.simulated, "d1.force", 1e-16);  // round-off
+  Perturb(&round.simulated, "d1.force", 1e-16);  // round-off
   EXPECT_EQ(round.Run().verdict, Verdict::kNotRun);
   Case perturbed = Weightless();
-  Bend(&perturbed.simulated, "d1.force", 0.5);  // a force out of nothing
+  Perturb(&perturbed.simulated, "d1.force", 0.5);  // a force out of nothing
   EXPECT_EQ(perturbed.Run().verdict, Verdict::kDisagree);
 }
 

@@ -13,8 +13,8 @@
 namespace mbv {
 namespace {
 
-using synthetic::Bend;
 using synthetic::Case;
+using synthetic::Perturb;
 using synthetic::Stretch;
 
 double Value(const Comparison& comparison, const std::string& check) {
@@ -53,7 +53,7 @@ TEST(Comparison, EqualWitnessesAgreeInEveryCheck) {
 TEST(Comparison, ForceNrmseIsRmsErrorOverRmsForceOfAllDrives) {
   Case c;
   // A constant error e on drive 1 only: pooled RMS error e/√2, pooled RMS force over 101 samples.
-  Bend(&c.simulated, "d1.force", 1e-6);
+  Perturb(&c.simulated, "d1.force", 1e-6);
   const double sum =
       c.analytic.values.col(3).squaredNorm() + c.analytic.values.col(7).squaredNorm();
   const double expected = 1e-6 * std::sqrt(101.0) / std::sqrt(sum);
@@ -94,7 +94,7 @@ class PerturbedSimulation : public testing::TestWithParam<BendCase> {};
 
 TEST_P(PerturbedSimulation, FailsItsCheckAndTheVerdict) {
   Case c;
-  Bend(&c.simulated, GetParam().channel, GetParam().offset);
+  Perturb(&c.simulated, GetParam().channel, GetParam().offset);
   const Comparison comparison = c.Run();
   EXPECT_TRUE(Fails(comparison, GetParam().check)) << Value(comparison, GetParam().check);
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
@@ -102,7 +102,7 @@ TEST_P(PerturbedSimulation, FailsItsCheckAndTheVerdict) {
 
 TEST_P(PerturbedSimulation, PassesWithAHundredthOfThePerturbation) {
   Case c;
-  Bend(&c.simulated, GetParam().channel, 0.01 * GetParam().offset);
+  Perturb(&c.simulated, GetParam().channel, 0.01 * GetParam().offset);
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
 }
 
@@ -137,7 +137,8 @@ TEST(Comparison, PowerThatFlowsTheOtherWayIsNotABalance) {
 TEST(Comparison, MissedCommandsFailWithoutAnyOtherWitness) {
   Case c;
   // All three agree with each other, and all are off the command by 2 nm.
-  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) Bend(trace, "d2.position", 2e-9);
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated})
+    Perturb(trace, "d2.position", 2e-9);
   const Comparison comparison = c.Run();
   EXPECT_TRUE(Fails(comparison, "simulated.command_m"));
   EXPECT_EQ(comparison.FindCheck("simulated.command_m")->channel, "d2");
@@ -164,7 +165,7 @@ TEST(Comparison, CommandedAnglesAreTakenModuloATurn) {
                         {{{Coordinate::Kind::kOutput, 0, 5}, 1.0}},
                         {{ConstantTerm{3.0 - 2.0 * std::numbers::pi}, RampTerm{0.5}}}}};
   EXPECT_FALSE(Fails(c.Run(), "simulated.command_rad"));
-  Bend(&c.simulated, "plate.yaw", 2e-9);
+  Perturb(&c.simulated, "plate.yaw", 2e-9);
   EXPECT_TRUE(Fails(c.Run(), "simulated.command_rad"));
 }
 
@@ -207,7 +208,7 @@ TEST(Comparison, ForcesThatCancelOutAreJudgedByTheForceScaleOfTheMechanism) {
       Stretch(trace, "d1.force", 0.0);
       Stretch(trace, "d2.force", 0.0);
     }
-    Bend(&c.simulated, "d1.force", amount);
+    Perturb(&c.simulated, "d1.force", amount);
     return c.Run();
   };
   // Bodies of 1 kg: the scale is what the fastest drive's RMS acceleration asks of one of them.
@@ -335,7 +336,7 @@ TEST(Comparison, ASmallDriveIsJudgedOnItsOwnScale) {
     trace->values.col(d1) *= 0.01 * trace->values.col(d2).norm() / trace->values.col(d1).norm();
   }
   const double own_rms = c.analytic.values.col(d1).norm() / std::sqrt(101.0);
-  Bend(&c.simulated, "d1.force", 1e-3 * own_rms);
+  Perturb(&c.simulated, "d1.force", 1e-3 * own_rms);
   const PairComparison pair = ComparePair(c.Input(), c.simulated, c.analytic);
   EXPECT_NEAR(pair.metrics.at(Metric::kForceOwn).value, 1e-3, 1e-12);
   EXPECT_LT(pair.metrics.at(Metric::kForceNrmse).value, 1e-5);
@@ -353,7 +354,7 @@ TEST(Comparison, SwitchedOffForceChecksVerifyNothing) {
 
 TEST(Comparison, ReactionsThatStaticsLeavesOpenAreNotJudged) {
   Case c;
-  Bend(&c.simulated, "slide1.reaction.fx", 5.0);
+  Perturb(&c.simulated, "slide1.reaction.fx", 5.0);
   EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
   for (const char* component : {"fx", "fy", "fz", "mx", "my", "mz"}) {
     c.reactions_not_unique.push_back(std::string("slide1.reaction.") + component);
@@ -367,19 +368,20 @@ TEST(Comparison, ReactionsThatStaticsLeavesOpenAreNotJudged) {
 TEST(Comparison, TheOtherComponentsOfAReactionThatIsPartlyOpenAreJudged) {
   Case c;
   c.reactions_not_unique = {"slide1.reaction.fz", "slide1.reaction.my"};
-  Bend(&c.simulated, "slide1.reaction.my", 5.0);
+  Perturb(&c.simulated, "slide1.reaction.my", 5.0);
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
   EXPECT_TRUE(IsLeftOut(c.Run(), "slide1.reaction (fz, my)"));
-  Bend(&c.simulated, "slide1.reaction.fx", 2e-8 * 10.5 * 1.8);
+  Perturb(&c.simulated, "slide1.reaction.fx", 2e-8 * 10.5 * 1.8);
   EXPECT_TRUE(Fails(c.Run(), "simulated_vs_analytic.reaction_nrmse"));
 }
 
 TEST(Comparison, LimitsOfTheForwardModeApplyToTheSimulationOnly) {
   Case c;
   c.column = LimitColumn::kForward;
-  Bend(&c.simulated, "d1.force", 1e-9 * 76.2);  // beyond the inverse limit, within the forward one
+  Perturb(&c.simulated, "d1.force",
+          1e-9 * 76.2);  // beyond the inverse limit, within the forward one
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
-  Bend(&c.reference, "d1.force", 1e-9 * 76.2);
+  Perturb(&c.reference, "d1.force", 1e-9 * 76.2);
   EXPECT_TRUE(Fails(c.Run(), "reference_vs_analytic.force_nrmse"));
 }
 
@@ -401,7 +403,7 @@ TEST(IntegrationError, WidensTheLimitsOfTheTrajectoryAlone) {
   run.column = LimitColumn::kForward;
   const auto check_of = [&](double stated, double off, const char* name) {
     Case wrong = run;
-    Bend(&wrong.simulated, "d1.position", off);
+    Perturb(&wrong.simulated, "d1.position", off);
     ComparisonInput input = wrong.Input();
     input.integration_error = stated;
     const Comparison comparison = Compare(input);
@@ -429,8 +431,22 @@ TEST(IntegrationError, WidensTheLimitsOfTheTrajectoryAlone) {
     });
   };
   EXPECT_FALSE(wide(Compare(input)));
-  input.integration_error = 0.5;
-  EXPECT_TRUE(wide(Compare(input)));
+  input.integration_error = 1e-9;
+  EXPECT_FALSE(wide(Compare(input)));
+  // Above the limit it is always one, and so wide that nothing is verified by the check, too.
+  for (const double error : {2.3e-5, 0.5}) {
+    input.integration_error = error;
+    const Comparison comparison = Compare(input);
+    EXPECT_TRUE(wide(comparison)) << error;
+    const CheckResult* check = comparison.FindCheck(position);
+    ASSERT_NE(check, nullptr);
+    EXPECT_EQ(check->insensitive.empty(), error < 0.1);
+  }
+  // Beside a table the solver integrates: what is compared with the table alone keeps its limit.
+  AlignedTable table;
+  input.integration_error = 2.3e-5;
+  input.table = &table;
+  EXPECT_EQ(Compare(input).FindCheck(position)->stated_limit, std::nullopt);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace mbv {
 namespace {
 
 // Both sliders run to a stop at `start_s` + 0.43 s and on to another place, 3-4-5 ramps.
-double WorstRate(double start_s, double bend) {
+double WorstRate(double start_s, double error) {
   const Mechanism mechanism = synthetic::TwoSliders();
   const RampCruiseTerm there{start_s, 0.24, 0.75, 10.0, 0.24};
   const RampCruiseTerm back{start_s + Duration(there), 0.06, 0.75, 10.0, -0.06};
@@ -23,7 +23,7 @@ double WorstRate(double start_s, double bend) {
     const Jet jet = Evaluate(profile, trace.time_s[i]);
     for (int drive = 0; drive < 2; ++drive) {
       trace.values.row(static_cast<Eigen::Index>(i)).segment<4>(4 * drive) << jet.value, jet.rate,
-          jet.acceleration * (1.0 + bend), 0.0;
+          jet.acceleration * (1.0 + error), 0.0;
     }
   }
   ComparisonInput input;
@@ -90,6 +90,28 @@ TEST(Derivatives, SamplesThatDoNotResolveAFastMotionAreNotJudgedAndSaySo) {
   Fast wrong(10.0);
   synthetic::Stretch(&wrong.trace, "d1.acceleration", 1.2);
   EXPECT_GT(wrong.Worst(), limit);
+}
+
+// A drive that turns by more than 2 rad between two samples hides what happens within a turn.
+TEST(Derivatives, DrivesThatTurnTooFarBetweenSamplesAreNotJudgedAndSaySo) {
+  const auto turning = [](double per_sample_rad) {
+    Fast fast(20.0);
+    fast.motion.commands.clear();
+    const int position = fast.trace.Find("d1.position");
+    fast.trace.channels[static_cast<size_t>(position)].unit = "rad";
+    for (size_t i = 0; i < fast.trace.time_s.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      fast.trace.values(row, position) += per_sample_rad * static_cast<double>(i);
+      fast.trace.values(row, fast.trace.Find("d1.velocity")) +=
+          per_sample_rad / fast.motion.sample_s;
+    }
+    synthetic::Stretch(&fast.trace, "d1.acceleration", 1.2);
+    return fast;
+  };
+  EXPECT_GT(turning(1.0).Worst(), *RowOf(Metric::kDerivatives).limits.reference);
+  EXPECT_TRUE(turning(1.0).Measure().derivatives_gap.empty());
+  EXPECT_EQ(turning(3.0).Worst(), 0.0);
+  EXPECT_NE(turning(3.0).Measure().derivatives_gap.find("d1"), std::string::npos);
 }
 
 // Dry friction stops d1 at 0.204 s: its acceleration jumps. Beside the jump nothing is judged if
@@ -227,7 +249,7 @@ TEST(DriveMotion, ADriveHeldStillIsComparedOnTheScaleOfOtherUnitsToo) {
   c.mechanism.gravity_W.setZero();
   const auto value = [&](double bend) {
     Trace perturbed = c.simulated;
-    synthetic::Bend(&perturbed, "d2.acceleration", bend);
+    synthetic::Perturb(&perturbed, "d2.acceleration", bend);
     const PairComparison pair = ComparePair(c.Input(), perturbed, c.analytic);
     return pair.metrics.at(Metric::kAcceleration).value;
   };

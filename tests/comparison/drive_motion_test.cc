@@ -12,8 +12,8 @@
 namespace mbv {
 namespace {
 
-using synthetic::Bend;
 using synthetic::Case;
+using synthetic::Perturb;
 
 bool Follows(const Comparison& comparison, const std::string& check) {
   const CheckResult* found = comparison.FindCheck(check);
@@ -63,7 +63,7 @@ TEST(DriveMotion, CouplingsOfDrivesCountAsCommandedOnlyTogetherWithOneOfThem) {
 
 TEST(DriveMotion, AFollowedMotionThatDiffersStillFails) {
   Case c;
-  Bend(&c.simulated, "d1.position", 2e-10);
+  Perturb(&c.simulated, "d1.position", 2e-10);
   const Comparison comparison = c.Run();
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
   EXPECT_GT(comparison.failed(), 0u);
@@ -90,7 +90,7 @@ TEST(DriveMotion, OutputRatesAreHeldAgainstTheCommand) {
     Case exact = c;
     EXPECT_EQ(exact.Run().verdict, Verdict::kAgree) << exact.Run().reason;
     Case wrong = c;
-    Bend(&wrong.simulated, perturbed.channel, perturbed.twice_the_limit);
+    Perturb(&wrong.simulated, perturbed.channel, perturbed.twice_the_limit);
     const Comparison comparison = wrong.Run();
     const CheckResult* check = comparison.FindCheck(perturbed.check);
     ASSERT_NE(check, nullptr) << perturbed.check;
@@ -98,7 +98,7 @@ TEST(DriveMotion, OutputRatesAreHeldAgainstTheCommand) {
     EXPECT_NEAR(check->value, 2.0 * *check->limit, 0.05 * *check->limit) << perturbed.channel;
     EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
     Case slight = c;
-    Bend(&slight.simulated, perturbed.channel, 0.25 * perturbed.twice_the_limit);
+    Perturb(&slight.simulated, perturbed.channel, 0.25 * perturbed.twice_the_limit);
     EXPECT_EQ(slight.Run().verdict, Verdict::kAgree) << perturbed.channel;
   }
 }

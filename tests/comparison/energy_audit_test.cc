@@ -100,7 +100,7 @@ TEST(EnergyAudit, ADriveForceTooLargeByAThousandthIsFoundAndNamed) {
 
 TEST(EnergyAudit, ADriftThatBeginsLaterIsDatedAndALostDamperIsNamed) {
   Pushed run;
-  Bend(&run.trace, "energy.kinetic", 1e-5, 120);
+  Perturb(&run.trace, "energy.kinetic", 1e-5, 120);
   EXPECT_NEAR(run.Audit().from_s, 1.2, 1e-12);
   EXPECT_NEAR(run.Audit().end_drift_J, 1e-5, 1e-12);
   Pushed damper;
@@ -220,15 +220,15 @@ TEST(EnergyScale, BesideABaseIsWhatTheCarriedBodiesOrTheDrivesCanDo) {
 TEST(EnergyScale, AShareOfTheBasesEnergyIsNotADriftAndOfNothingElse) {
   OnMovingVehicle run;
   const double base_J = 1e8 * std::sin(1.0) + 9.0;
-  Bend(&run.trace, "d2.work", 0.5e-8 * base_J);
+  Perturb(&run.trace, "d2.work", 0.5e-8 * base_J);
   EXPECT_EQ(run.Audit().drift.value, 0.0);
-  Bend(&run.trace, "d2.work", 1.5e-8 * base_J);
+  Perturb(&run.trace, "d2.work", 1.5e-8 * base_J);
   EXPECT_GT(run.Audit().drift.value, 0.0);
   OnMovingVehicle light;  // a base that turns over no more than the drive
   for (const char* part : {"energy.kinetic", "vehicle.work"}) Stretch(&light.trace, part, 0.0);
   light.trace.values.col(light.trace.Find("energy.kinetic")) =
       light.trace.values.col(light.trace.Find("d2.work"));
-  Bend(&light.trace, "d2.work", 1e-9);
+  Perturb(&light.trace, "d2.work", 1e-9);
   EXPECT_GT(light.Audit().drift.value, 0.0);
 }
 

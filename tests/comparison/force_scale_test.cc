@@ -13,9 +13,9 @@ namespace mbv {
 namespace {
 
 using synthetic::AddChannel;
-using synthetic::Bend;
 using synthetic::Case;
 using synthetic::OnVehicle;
+using synthetic::Perturb;
 using synthetic::Stretch;
 
 bool CheckFails(const Comparison& comparison, const std::string& check) {
@@ -428,7 +428,7 @@ TEST(PowerScale, ThePowerOfTheBaseDoesNotHideTheDrives) {
   Lifted c;
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
   // Twice the limit of what the cart's weight takes at 1 m/s and its own speed.
-  Bend(&c.simulated, "power.energy_rate", 2e-8 * 19.62 * (1.0 + 0.4 * std::numbers::pi));
+  Perturb(&c.simulated, "power.energy_rate", 2e-8 * 19.62 * (1.0 + 0.4 * std::numbers::pi));
   EXPECT_TRUE(CheckFails(c.Run(), "simulated.power_balance"));
 }
 
@@ -441,7 +441,7 @@ TEST(PowerScale, WhatTheDrivesDoCountsBesideABaseHoweverHardTheyPush) {
   for (const char* name : {"power.input", "power.energy_rate"}) {
     trace.values.col(trace.Find(name)) = drive.array() + (1e7 + 2.0) * 9.81;
   }
-  Bend(&trace, "power.energy_rate", 10.0);
+  Perturb(&trace, "power.energy_rate", 10.0);
   const Comparison comparison = c.Run();
   ASSERT_NE(comparison.FindCheck("simulated.power_balance"), nullptr);
   EXPECT_NEAR(comparison.FindCheck("simulated.power_balance")->value,
@@ -451,11 +451,11 @@ TEST(PowerScale, WhatTheDrivesDoCountsBesideABaseHoweverHardTheyPush) {
 TEST(PowerScale, RoundOffOfAHeavyBaseIsNotAnImbalance) {
   Lifted c;
   for (const char* name : {"power.input", "power.energy_rate", "power.base"}) {
-    Bend(&c.simulated, name, 1e11);
+    Perturb(&c.simulated, name, 1e11);
   }
-  Bend(&c.simulated, "power.energy_rate", 1e-4);  // ten units in the last place
+  Perturb(&c.simulated, "power.energy_rate", 1e-4);  // ten units in the last place
   EXPECT_FALSE(CheckFails(c.Run(), "simulated.power_balance"));
-  Bend(&c.simulated, "power.energy_rate", 1e-3);
+  Perturb(&c.simulated, "power.energy_rate", 1e-3);
   EXPECT_TRUE(CheckFails(c.Run(), "simulated.power_balance"));
 }
 

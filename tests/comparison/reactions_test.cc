@@ -8,9 +8,9 @@ namespace mbv {
 namespace {
 
 using synthetic::AddChannel;
-using synthetic::Bend;
 using synthetic::Case;
 using synthetic::OnVehicle;
+using synthetic::Perturb;
 using synthetic::Stretch;
 
 // As Case, with a reaction of 1e-6 N at slide2 beside the 10 N of slide1; body b weighs nothing to
@@ -45,9 +45,9 @@ TEST(Reactions, ASmallReactionIsJudgedOnItsOwnScale) {
 TEST(Reactions, AJointThatCarriesNothingIsJudgedByItsNeighbours) {
   Case c;
   for (const Channel& channel : ReactionChannels(c.mechanism.joints[1])) AddChannel(&c, channel, 0);
-  Bend(&c.simulated, "slide2.reaction.fy", 1e-14);  // round-off beside 1 kg
+  Perturb(&c.simulated, "slide2.reaction.fy", 1e-14);  // round-off beside 1 kg
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
-  Bend(&c.simulated, "slide2.reaction.fy", 1e-5);
+  Perturb(&c.simulated, "slide2.reaction.fy", 1e-5);
   EXPECT_FALSE(Check(c.Run(), "reaction_nrmse_own").pass);
   EXPECT_TRUE(Check(c.Run(), "reaction_nrmse_own").floored);
 }

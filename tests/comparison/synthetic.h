@@ -82,7 +82,7 @@ inline Trace ExactTrace(const std::string& witness) {
 }
 
 /// Adds `amount` to a channel at every sample from index `from` to the end.
-inline void Bend(Trace* trace, const std::string& channel, double amount, size_t from = 0) {
+inline void Perturb(Trace* trace, const std::string& channel, double amount, size_t from = 0) {
   const int column = trace->Find(channel);
   for (size_t i = from; i < trace->time_s.size(); ++i) {
     trace->values(static_cast<Eigen::Index>(i), column) += amount;

@@ -445,7 +445,7 @@ TEST(TableTube, TwoComputationsStandAgainstAColumnInItsOwnUnit) {
   c.AddColumn("plate.x", [](double t) { return 0.3 * t + 8e-4 * std::sin(kOmega * t); });
   c.table.columns.back().channel.unit = c.table.columns.back().unit = "m";
   c.Print(1e-9);
-  synthetic::Bend(&c.base.simulated, "plate.x", 1e-9);
+  synthetic::Perturb(&c.base.simulated, "plate.x", 1e-9);
   const Comparison comparison = c.Run();
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
   const std::string& text = comparison.attribution.text;

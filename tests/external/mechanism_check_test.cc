@@ -55,7 +55,7 @@ TEST(MechanismCheck, TheSchemaKnowsAllJointKinds) {
   EXPECT_EQ(schema["definitions"]["joint"]["properties"]["kind"]["enum"], words);
 }
 
-struct Bend {
+struct Perturb {
   const char* what;
   std::function<void(Edited*)> edit;
   std::string reported;
@@ -63,7 +63,7 @@ struct Bend {
 
 TEST(MechanismCheck, ReportsWhatIsPerturbed) {
   const std::string written = WrittenModel("four_bar");
-  const Bend bends[] = {
+  const Perturb bends[] = {
       {"no mass", [](Edited* m) { (*m)["bodies"][1].erase("mass"); }, "bodies[1]: "},
       {"a word", [](Edited* m) { (*m)["bodies"][1]["mass"] = "2"; }, "bodies[1].mass: "},
       {"below zero", [](Edited* m) { (*m)["bodies"][1]["mass"] = -2; }, "bodies[1].mass: "},
@@ -101,7 +101,7 @@ TEST(MechanismCheck, ReportsWhatIsPerturbed) {
          for (auto& joint : (*m)["joints"]) joint["closure"] = true;
        },
        "bodies[1]: 'crank' is not joined to the world"}};
-  for (const Bend& bend : bends) {
+  for (const Perturb& bend : bends) {
     Edited edited = Edited::parse(written);
     bend.edit(&edited);
     const std::string found = Findings(edited.dump());

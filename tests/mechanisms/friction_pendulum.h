@@ -66,7 +66,8 @@ struct RubbingPendulum {
   }
 };
 
-/// The pendulum's body on a rubbing journal whose axis is not level: weight along it is not a load.
+/// The pendulum's body on a journal with friction whose axis is not level: weight along it is not a
+/// load.
 struct JournalPendulum {
   static constexpr double m = RubbingPendulum::m, r = RubbingPendulum::r, g = RubbingPendulum::g;
   double coefficient = 0.15, radius = 0.04;

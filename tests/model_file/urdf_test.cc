@@ -385,9 +385,9 @@ TEST(UrdfExport, ForceElementsComeBack) {
   LoadResult loaded = LoadModel(SourcePath("/models/rubbing_five_bar/model.yaml"));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;
-  const std::string urdf = WriteFile("rubbing.urdf", WriteUrdf(m));
+  const std::string urdf = WriteFile("friction.urdf", WriteUrdf(m));
   EXPECT_NE(WriteUrdf(m).find("<dynamics damping=\"0.03\"/>"), std::string::npos);
-  const LoadResult back = LoadModel(WriteFile("rubbing.yaml", WriteUrdfCompanion(m, urdf)));
+  const LoadResult back = LoadModel(WriteFile("friction.yaml", WriteUrdfCompanion(m, urdf)));
   ASSERT_TRUE(back.mechanism.has_value()) << back.diagnostics.Text();
   ASSERT_EQ(back.mechanism->elements.size(), m.elements.size());
   const auto sum = [](const Mechanism& of, auto visit) {

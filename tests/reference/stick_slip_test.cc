@@ -245,9 +245,9 @@ TEST(StickSlip, FrictionOnACommandedCoordinateIsItsDrives) {
              a2 = ColumnOf(run.trace, "motor2.acceleration"),
              v1 = ColumnOf(run.trace, "motor1.velocity");
   const VecX inertia = (lower + upper) * a1 + upper * a2;
-  const VecX rubs = ColumnOf(run.trace, "motor1.force") - inertia;
-  for (Eigen::Index i = 0; i < rubs.size(); ++i) {
-    EXPECT_NEAR(rubs[i], std::copysign(ground, v1[i]), 1e-11) << i;
+  const VecX friction = ColumnOf(run.trace, "motor1.force") - inertia;
+  for (Eigen::Index i = 0; i < friction.size(); ++i) {
+    EXPECT_NEAR(friction[i], std::copysign(ground, v1[i]), 1e-11) << i;
   }
   EXPECT_LT(Unbalanced(run.trace), kFollowed);
   // Held, it may bear anything up to its breakaway; the other is held by no drive.
@@ -600,8 +600,8 @@ TEST(DeadCentre, SlidersWithFrictionInTheirGuidesFollowTheirEquationOfMotion) {
   }
 }
 
-// Guides that rub by what they bear as well: at the dead centre both turn at once, by the loads of
-// the motion that goes on.
+// Guides with friction by what they bear as well: at the dead centre both turn at once, by the
+// loads of the motion that goes on.
 TEST(DeadCentre, SlidersThatRubByTheirLoadsFollowTheirEquationOfMotion) {
   for (const int sliders : {1, 2}) {
     for (const Start& start :
@@ -625,8 +625,8 @@ TEST(DeadCentre, SlidersThatRubByTheirLoadsFollowTheirEquationOfMotion) {
   }
 }
 
-// A slider that rests at its dead centre is not held there: it rubs as soon as the motor begins to
-// turn the crank, however late.
+// A slider that rests at its dead centre is not held there: it slides as soon as the motor begins
+// to turn the crank, however late.
 TEST(DeadCentre, ASliderThatRestsThereRubsOnceTheMotorTurns) {
   const double force = 0.5;
   Mechanism m = Boxer{}.Make(0.0);

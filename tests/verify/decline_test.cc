@@ -1,5 +1,5 @@
-// Models outside what a closed form covers: the analytic witness declines and says why, the other
-// two go on.
+// Models outside what a closed form covers: the analytic witness is not applicable and says why,
+// the other two go on.
 #include <gtest/gtest.h>
 
 #include <algorithm>

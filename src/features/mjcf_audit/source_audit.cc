@@ -179,13 +179,14 @@ SourceModelError SourceModelRuns::ErrorOf(const SourceModelRun& run) {
 // Where friction at rest leaves the true force within a band, forces of a run that lie in it are
 // right: both become the middle. Others are wrong by their distance from the band.
 void CloseBands(Trace* run, Trace* truth) {
+  const CommonSamples samples = AlignSamples(*run, *truth);
   for (size_t c = 0; c < truth->channels.size(); ++c) {
     const Channel& band = truth->channels[c];
     if (band.quantity != Quantity::kForceBand) continue;
     const int middle = truth->Find(Quantity::kForce, band.subject);
     const int force = run->Find(Quantity::kForce, band.subject);
     if (middle < 0 || force < 0) continue;
-    for (const auto& [i, j] : AlignSamples(*run, *truth)) {
+    for (const auto& [i, j] : samples) {
       double& half = truth->values(j, static_cast<Eigen::Index>(c));
       const double off = run->values(i, force) - truth->values(j, middle);
       if (half > 0.0) run->values(i, force) -= std::clamp(off, -half, half);

@@ -61,7 +61,7 @@ double ExcessOf(const CaseResult& result) {
   return worst;
 }
 
-// "; changed since: turn.yaml", or that nothing is known to have; "" without a run to compare with.
+// "changed since: turn.yaml changed"; "" where nothing did.
 std::string SinceText(const CaseResult& result) {
   return result.changes.empty() ? ""
                                 : fmt::format("changed since: {}", fmt::join(result.changes, "; "));

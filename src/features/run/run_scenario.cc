@@ -256,6 +256,7 @@ int ExitCodeOf(Verdict verdict) {
 // What a quarter of the step brings below this share came from the step: first order would leave a
 // quarter.
 constexpr double kStepsShare = 0.3;
+constexpr double kMostFineSteps = 1e6;  // longer runs are not repeated
 
 class ScenarioRun {
  public:
@@ -411,7 +412,7 @@ class ScenarioRun {
   }
 
   // Where an integrated simulation alone disagrees: is it the mechanism or the step? The same run
-  // with a quarter of the step tells. The verdict stays: it is about the step that the scenario
+  // with a quarter of the step shows it. The verdict stays: it is about the step that the scenario
   // has.
   void TrySmallerStep(ComparisonInput input) {
     const SimulationSettings& settings = scenario().simulation;
@@ -431,6 +432,7 @@ class ScenarioRun {
     SimulationOptions options =
         OptionsOf(scenario(), prepared_->mechanisms.simulated, Engine::kCorrected);
     options.step_s *= 0.25;
+    if (scenario().motion.duration_s > kMostFineSteps * options.step_s) return;
     const SimulatedWitness finer = runner.Simulate(options, "a quarter of the step");
     report_.timing.simulation_s += finer.run.summary.wall_s;
     if (!finer.run.summary.ok()) return;
@@ -441,10 +443,10 @@ class ScenarioRun {
     const CheckResult* same = compared.FindCheck(worst->name);
     Attribution& attribution = report_.comparison.attribution;
     if (compared.verdict == Verdict::kAgree) {
-      attribution = {role::kSimulated.name,
-                     fmt::format("simulation.step_s = {:g} is too coarse for this motion: with "
-                                 "{:g} all checks pass",
-                                 settings.step_s, options.step_s)};
+      attribution.odd_one_out = role::kSimulated.name;
+      attribution.text = fmt::format(
+          "simulation.step_s = {:g} is too coarse for this motion: with {:g} all checks pass",
+          settings.step_s, options.step_s);
     } else if (same != nullptr && same->value < kStepsShare * worst->value) {
       attribution.text += fmt::format(
           "{}with simulation.step_s = {:g} the worst check, {}, falls from "

@@ -282,7 +282,7 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   return summary;
 }
 
-// Where a corrected run has diverged, what a quarter of its step does tells whether the step or
+// Where a corrected run has diverged, what a quarter of its step does shows whether the step or
 // the model is to blame.
 std::string WithQuarterStep(const Mechanism& mechanism, const Motion& motion,
                             const DrivenMotion& driven, SimulationOptions options,

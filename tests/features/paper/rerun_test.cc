@@ -29,7 +29,7 @@ struct RerunCase {
     }
     return {};
   }
-  void Bend(const std::string& signal, int row, double factor) {
+  void Perturb(const std::string& signal, int row, double factor) {
     rerun.values(row, rerun.Find(signal)) *= factor;
   }
 };
@@ -53,7 +53,7 @@ TEST(Rerun, OneNumberPerturbedByAThousandthIsOutside) {
   for (const LimitColumn column :
        {LimitColumn::kForward, LimitColumn::kInverse, LimitColumn::kReference}) {
     RerunCase c;
-    c.Bend("d1.force", 30, 1.001);
+    c.Perturb("d1.force", 30, 1.001);
     EXPECT_FALSE(c.Of("d1.force", column).inside());
     EXPECT_NEAR(c.Of("d1.force", column).time_s, c.packed.time_s[30], 1e-12);
     EXPECT_TRUE(c.Of("d2.force", column).inside());

@@ -20,8 +20,8 @@ constexpr const char* kFile = "history.sqlite";
 class HistoryTest : public FolderTest {
  protected:
   // Appends one run of one scenario; the run as judged.
-  static RegressReport Night(double nrmse, const std::string& label = "",
-                             const GoldenTraces& golden = {}, const std::string& inputs = "1111") {
+  static RegressReport Record(double nrmse, const std::string& label = "",
+                              const GoldenTraces& golden = {}, const std::string& inputs = "1111") {
     CaseResult result = AgreeingCase("model/case", nrmse);
     result.inputs = inputs;
     RegressReport report = OneRun({result}, label);
@@ -51,21 +51,21 @@ class HistoryTest : public FolderTest {
 };
 
 TEST_F(HistoryTest, RunsAreNumberedAndTheirCourseComesBack) {
-  EXPECT_EQ(Night(1e-9).run.id, 1);
-  EXPECT_EQ(Night(2e-9).run.id, 2);
-  const RegressReport third = Night(3e-9);
+  EXPECT_EQ(Record(1e-9).run.id, 1);
+  EXPECT_EQ(Record(2e-9).run.id, 2);
+  const RegressReport third = Record(3e-9);
   EXPECT_EQ(third.run.id, 3);
   EXPECT_EQ(third.cases.front().course, (std::vector<double>{1e-9, 2e-9, 3e-9}));
 }
 
 TEST_F(HistoryTest, TenTimesWorseInsideItsLimitIsDriftWithTheRunItBegan) {
-  for (int i = 0; i < 4; ++i) EXPECT_TRUE(DriftsOf(Night(1e-9)).empty());
-  const RegressReport fifth = Night(2e-8, "commit-five");
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(DriftsOf(Record(1e-9)).empty());
+  const RegressReport fifth = Record(2e-8, "commit-five");
   ASSERT_EQ(DriftsOf(fifth).size(), 1U);
   EXPECT_TRUE(fifth.cases.front().verified) << "inside its limit of 1e-6";
   EXPECT_EQ(DriftsOf(fifth)[0].metric, "simulated_vs_analytic.force_nrmse");
   EXPECT_EQ(CountCases(fifth).drifted, 1);
-  const RegressReport sixth = Night(2e-8, "commit-six");
+  const RegressReport sixth = Record(2e-8, "commit-six");
   ASSERT_EQ(DriftsOf(sixth).size(), 1U);
   EXPECT_EQ(DriftsOf(sixth)[0].since_run, 5);
   EXPECT_NE(DriftsOf(sixth)[0].since.find("commit-five"), std::string::npos);
@@ -73,35 +73,35 @@ TEST_F(HistoryTest, TenTimesWorseInsideItsLimitIsDriftWithTheRunItBegan) {
 }
 
 TEST_F(HistoryTest, AFiveTimesWorseNightIsNotADrift) {
-  for (int i = 0; i < 4; ++i) Night(1e-9);
-  EXPECT_TRUE(DriftsOf(Night(5e-9)).empty());
+  for (int i = 0; i < 4; ++i) Record(1e-9);
+  EXPECT_TRUE(DriftsOf(Record(5e-9)).empty());
 }
 
 TEST_F(HistoryTest, AcceptingARunStartsANewBaseline) {
-  for (int i = 0; i < 4; ++i) Night(1e-9);
-  Night(2e-8);
+  for (int i = 0; i < 4; ++i) Record(1e-9);
+  Record(2e-8);
   EXPECT_EQ(AcceptRun(kFile, "last", "", "a coarser step").trouble, "");
-  EXPECT_TRUE(DriftsOf(Night(2e-8)).empty());
-  EXPECT_EQ(DriftsOf(Night(3e-7)).size(), 1U);
+  EXPECT_TRUE(DriftsOf(Record(2e-8)).empty());
+  EXPECT_EQ(DriftsOf(Record(3e-7)).size(), 1U);
   EXPECT_NE(AcceptRun(kFile, "last", "model/unknown", "").trouble, "");
 }
 
 TEST_F(HistoryTest, SaysWhichWitnessTookAStepOnce) {
-  EXPECT_TRUE(DriftsOf(Night(1e-9, "", Forces(1, 1))).empty());
-  const RegressReport analytic = Night(1e-9, "", Forces(1.001, 1));
+  EXPECT_TRUE(DriftsOf(Record(1e-9, "", Forces(1, 1))).empty());
+  const RegressReport analytic = Record(1e-9, "", Forces(1.001, 1));
   ASSERT_EQ(DriftsOf(analytic).size(), 1U);
   EXPECT_NE(DriftsOf(analytic)[0].text.find("analytic moved"), std::string::npos);
   EXPECT_NE(DriftsOf(analytic)[0].text.find("files are the same"), std::string::npos);
-  EXPECT_TRUE(DriftsOf(Night(1e-9, "", Forces(1.001, 1))).empty());
-  const RegressReport simulated = Night(1e-9, "", Forces(1.001, 1.001));
+  EXPECT_TRUE(DriftsOf(Record(1e-9, "", Forces(1.001, 1))).empty());
+  const RegressReport simulated = Record(1e-9, "", Forces(1.001, 1.001));
   EXPECT_NE(DriftsOf(simulated).at(0).text.find("simulation moved"), std::string::npos);
-  const RegressReport both = Night(1e-9, "", Forces(2, 2), "2222");
+  const RegressReport both = Record(1e-9, "", Forces(2, 2), "2222");
   EXPECT_NE(DriftsOf(both).at(0).text.find("both moved"), std::string::npos);
   EXPECT_NE(DriftsOf(both).at(0).text.find("model file changed"), std::string::npos);
 }
 
 TEST_F(HistoryTest, EqualNightsShareOneCopyOfTheirTraces) {
-  for (int i = 0; i < 5; ++i) Night(1e-9, "", Forces(1, 2));
+  for (int i = 0; i < 5; ++i) Record(1e-9, "", Forces(1, 2));
   EXPECT_EQ(Count("SELECT COUNT(*) FROM golden"), 10);
   EXPECT_EQ(Count("SELECT COUNT(*) FROM trace"), 2);
 }
@@ -198,8 +198,8 @@ TEST_F(HistoryTest, KillingAWriterLeavesWholeRunsOnly) {
 }
 
 TEST_F(HistoryTest, ComparesTwoRunsByStatusNumbersAndWitness) {
-  Night(1e-9, "", Forces(1, 1));
-  Night(4e-9, "", Forces(1, 1.5));
+  Record(1e-9, "", Forces(1, 1));
+  Record(4e-9, "", Forces(1, 1.5));
   const HistoryText text = CompareRuns(kFile, "last~1", "last");
   EXPECT_EQ(text.trouble, "");
   EXPECT_NE(text.text.find("1.00e-09 → 4.00e-09"), std::string::npos) << text.text;
@@ -224,7 +224,7 @@ TEST_F(HistoryTest, StiffnessIsComparedWhereThereAreNoForces) {
 }
 
 TEST_F(HistoryTest, ExportsOneLinePerMetricAndRun) {
-  Night(1e-9, "a, \"b\"");
+  Record(1e-9, "a, \"b\"");
   const HistoryText csv = HistoryCsv(kFile);
   EXPECT_EQ(csv.trouble, "");
   EXPECT_EQ(csv.text.substr(csv.text.find('\n') + 1),
@@ -239,7 +239,7 @@ TEST_F(HistoryTest, AForeignOrNewerFileIsRefusedAndLeftAlone) {
   EXPECT_NE(AppendRun(kFile, {}, &report), "");
   EXPECT_EQ(Read(kFile), "this is not a database, but long enough to look at");
   std::filesystem::remove(kFile);
-  Night(1e-9);
+  Record(1e-9);
   {
     Database database(kFile, Database::Mode::kWrite);
     database.Run("PRAGMA user_version = 99");
@@ -270,7 +270,7 @@ TEST_F(HistoryTest, ARunOfTheSameIdIsEnteredOnce) {
 }
 
 TEST_F(HistoryTest, FilesOfTheFirstSchemaGoOn) {
-  Night(1e-9);
+  Record(1e-9);
   {
     Database database(kFile, Database::Mode::kWrite);
     database.Run("DROP INDEX run_uid");
@@ -281,7 +281,7 @@ TEST_F(HistoryTest, FilesOfTheFirstSchemaGoOn) {
   }
   EXPECT_EQ(ListRuns(kFile).trouble, "");
   EXPECT_EQ(CheckHistory(kFile), "");
-  EXPECT_EQ(Night(2e-9).run.id, 2);
+  EXPECT_EQ(Record(2e-9).run.id, 2);
   EXPECT_EQ(Count("PRAGMA user_version"), kHistoryVersion);
 }
 
@@ -441,8 +441,8 @@ TEST_F(HistoryTest, WhatIsMissingCanBeAccepted) {
 }
 
 TEST_F(HistoryTest, AFailureReportsWhenItWasLastAsExpected) {
-  Night(1e-9);
-  Night(2e-9, "good-one");
+  Record(1e-9);
+  Record(2e-9, "good-one");
   const auto wrong = [] {
     CaseResult result = AgreeingCase("model/case", 1e-3);
     result.status = CaseStatus::kUnexpected;
@@ -459,7 +459,7 @@ TEST_F(HistoryTest, AFailureReportsWhenItWasLastAsExpected) {
   }
   EXPECT_EQ(first.runs, 2);
   EXPECT_EQ(second.runs, 3);
-  EXPECT_EQ(Night(1e-9).cases.front().past.runs, 0) << "nothing to report of what is as expected";
+  EXPECT_EQ(Record(1e-9).cases.front().past.runs, 0) << "nothing to report of what is as expected";
 }
 
 TEST_F(HistoryTest, AnotherProgramsDatabaseIsLeftAlone) {
@@ -475,7 +475,7 @@ TEST_F(HistoryTest, AnotherProgramsDatabaseIsLeftAlone) {
 
 // On a medium that cannot be written, as another user.
 TEST_F(HistoryTest, CanBeListedWhereItCannotBeWritten) {
-  Night(1e-9);
+  Record(1e-9);
   std::filesystem::create_directories("read only #1");
   std::filesystem::rename(kFile, "read only #1/history?.sqlite");
   const std::string path = (folder_ / "read only #1" / "history?.sqlite").string();

@@ -60,7 +60,7 @@ inline RegressReport OneRun(std::vector<CaseResult> cases, const std::string& la
   RegressReport report;
   report.run.started_utc = "2026-01-31T02:00:00Z";
   report.run.finished_utc = "2026-01-31T02:01:00Z";
-  report.run.host = "night";
+  report.run.host = "machine";
   report.run.program = "mbverify 0.1.0 build 0123abcd";
   report.run.label = label;
   report.run.wall_s = 60.0;

@@ -259,7 +259,7 @@ RunOutcome RunAllowed(const Folder& folder, const std::string& scenario, const s
 }
 
 // A warning below would be overlooked: the sentence of the verdict says what the model lets pass.
-TEST(Concession, RoundedDataAndImpossibleInertiasStandInTheVerdict) {
+TEST(Waiver, RoundedDataAndImpossibleInertiasStandInTheVerdict) {
   const Folder rounded("rounded_bricard");
   const RunOutcome projected =
       RunAllowed(rounded, "bricard/turn_inverse", "closure_tolerance: 3e-3",

@@ -29,7 +29,7 @@ class ResumeTest : public testing::Test {
     EXPECT_NE(at, std::string::npos) << from;
     return at == std::string::npos ? text : text.replace(at, from.size(), to);
   }
-  [[nodiscard]] std::string Night(const std::string& more) const {
+  [[nodiscard]] std::string CallWith(const std::string& more) const {
     return "regress '" + (mbverify.folder() / "regression").string() + "' --out '" +
            mbverify.Out() +
            "' --quiet --no-history --no-pictures --no-reports --jobs 1 --worker '" +
@@ -38,14 +38,14 @@ class ResumeTest : public testing::Test {
   // A regression that is interrupted by its last scenario.
   void Interrupted() const {
     Put("stop", "");
-    const ProgramResult result = mbverify(Night(""));
+    const ProgramResult result = mbverify(CallWith(""));
     fs::remove(mbverify.folder() / "regression/stop");
     EXPECT_EQ(result.exit_code, 3) << result.err;
     EXPECT_NE(result.err.find("interrupted after 3 of 4"), std::string::npos) << result.err;
   }
   // Goes on with it: the scenarios that were computed again, but for the last one.
   [[nodiscard]] std::string ComputedAgain() const {
-    const ProgramResult result = mbverify(Night("--resume"));
+    const ProgramResult result = mbverify(CallWith("--resume"));
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
     const auto report =
         nlohmann::json::parse(ReadAll(mbverify.folder() / "out/regress.json"), nullptr, false);
