@@ -28,6 +28,7 @@ constexpr double kOpen = 1e-9;
 constexpr double kRoundOff = 1e-2;
 // A step that is round-off itself [rad, characteristic lengths]: rows are not evaluated again.
 constexpr double kNoStep = 1e-14;
+constexpr double kStepFromHome = 0.1;  ///< [rad, characteristic lengths], by the tangent
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -228,6 +229,16 @@ void ClosureSolver::Accept(const VecX& target, Trial* trial) {
   orientation_ = system_.determinant_sign();
 }
 
+int ClosureSolver::StepsFromHome(const VecX& target) {
+  if (!system_.Factor(rows_, selection_, selection_is_new_)) return options_.homotopy_steps;
+  selection_is_new_ = false;
+  VecX rates = VecX::Zero(system_.size());
+  rates.tail(target.size()) = target - target_;
+  const double steps = std::ceil(SizeOf(system_.SolveTransposed(rates), length_) / kStepFromHome);
+  if (!(steps < options_.homotopy_steps)) return options_.homotopy_steps;
+  return std::max(1, static_cast<int>(steps));
+}
+
 RunSummary ClosureSolver::Follow(const VecX& target, int first_steps) {
   const VecX start = target_;
   double reached = 0.0, step = 1.0 / first_steps, selected_at = -1.0;
@@ -348,7 +359,7 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
     }
   }
   RunSummary summary = RunSummary::Done();
-  if (!done) summary = Follow(target, first ? options_.homotopy_steps : 4);
+  if (!done) summary = Follow(target, first ? StepsFromHome(target) : 4);
   if (first && summary.ok()) summary = TakeLeastTurns();
   if (first && summary.ok()) StartAngles(mechanism_, followed_, &states_);
   if (summary.ok()) summary = CheckPose();

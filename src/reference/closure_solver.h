@@ -58,6 +58,9 @@ class ClosureSolver {
   }
   [[nodiscard]] Step Newton(const VecX& target, bool limit_step, Trial* trial);
   [[nodiscard]] RunSummary Follow(const VecX& target, int first_steps);
+  /// Into how many steps the way from home is cut first: by the motion that the bodies begin it
+  /// with. At home, its rows evaluated.
+  [[nodiscard]] int StepsFromHome(const VecX& target);
   /// The determinant has changed its sign since the last pose.
   [[nodiscard]] bool Turned() const {
     return orientation_ != 0 && system_.determinant_sign() != orientation_;

@@ -121,6 +121,15 @@ RunSummary ForceSolver::SelectBasis() {
   return RunSummary::Done();
 }
 
+// All motions of a mechanism begin with the same basis; where it is none, the pose chooses.
+void ForceSolver::SelectAtHome() {
+  BodyStates home;
+  home.Resize(mechanism_.bodies.size());
+  home.X_WB = mechanism_.X_WB_home;
+  FillRows(home);
+  (void)SelectBasis();
+}
+
 bool ForceSolver::Factor() {
   if (!system_.Factor(rows_, basis_, basis_is_new_)) return false;
   sparse_ = rest_.size() > kFewSelfStresses && FactorSparse();
@@ -207,6 +216,7 @@ VecX ForceSolver::LeastNorm(const VecX& wrenches) {
 }
 
 RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample) {
+  if (!chosen_) SelectAtHome();
   FillRows(sample->states);
   std::vector<Vec6> required;
   sample->friction_signs = FrictionDirections(mechanism_, sample->states, duration_s_);

@@ -42,6 +42,7 @@ class ForceSolver {
 
  private:
   void FillRows(const BodyStates& states);
+  void SelectAtHome();
   [[nodiscard]] RunSummary SelectBasis();
   [[nodiscard]] bool Factor();
   [[nodiscard]] bool FactorSparse();

@@ -19,7 +19,7 @@ namespace mbv {
 struct ReferenceOptions {
   double closure_tolerance_m = 1e-13;  ///< Newton's end, for a characteristic length of 1 m; or rad
   int max_iterations = 30;             ///< per sample, > 0
-  int homotopy_steps = 40;             ///< from home to the first sample, > 0
+  int homotopy_steps = 40;             ///< at most at first, from home to the first sample; > 0
   bool reactions = true;               ///< record every joint's reaction channels
 };
 

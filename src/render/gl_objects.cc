@@ -219,6 +219,7 @@ bool GoesOn(const Item& before, const Item& item) {
 
 DrawnMeshes DrawnMeshesOf(const std::vector<std::shared_ptr<const TriangleMesh>>& meshes) {
   std::vector<const TriangleMesh*> all;
+  all.reserve(meshes.size());
   for (const auto& mesh : meshes) all.push_back(mesh.get());
   const std::vector<std::size_t> shares = SharesOf(all, kMostTriangles);
   DrawnMeshes drawn;

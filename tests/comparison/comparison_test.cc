@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "base/text.h"
 #include "comparison/force_scale.h"
 #include "mechanism/reach.h"
 
@@ -425,9 +426,9 @@ TEST(IntegrationError, WidensTheLimitsOfTheTrajectoryAlone) {
   EXPECT_FALSE(check_of(2.3e-5, 0.0, "simulated_vs_reference.velocity_nrmse").stated_limit);
   // So wide a limit is a caveat.
   ComparisonInput input = run.Input();
-  const auto wide = [](const Comparison& comparison) {
-    return std::ranges::any_of(comparison.caveats, [](const Caveat& caveat) {
-      return caveat.kind == CaveatKind::kWideLimits;
+  const auto wide = [&](const Comparison& comparison) {
+    return std::ranges::any_of(comparison.caveats, [&](const Caveat& caveat) {
+      return caveat.kind == CaveatKind::kWideLimits && Contains(caveat.of, position);
     });
   };
   EXPECT_FALSE(wide(Compare(input)));

@@ -161,6 +161,7 @@ std::vector<const CaseResult*> BySeverity(const RegressReport& report) {
     return std::tie(std::get<0>(a), std::get<1>(a)) < std::tie(std::get<0>(b), std::get<1>(b));
   });
   std::vector<const CaseResult*> cases;
+  cases.reserve(ranked.size());
   for (const auto& entry : ranked) cases.push_back(std::get<2>(entry));
   return cases;
 }
