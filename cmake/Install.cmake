@@ -30,8 +30,10 @@ install(FILES ${CMAKE_BINARY_DIR}/mbverify.1.gz DESTINATION ${CMAKE_INSTALL_MAND
         COMPONENT runtime)
 install(TARGETS mbverify_library EXPORT mbverify ARCHIVE COMPONENT development)
 target_include_directories(mbverify_library INTERFACE
+                           $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
                            $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/mbverify>)
-# The public headers with all that they include, and no other.
+install(DIRECTORY include/mbverify DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
+# What programs with closed forms of their own include, and no other header.
 set(waiting analytic/register_closed_form.h program.h)
 set(public)
 while(waiting)

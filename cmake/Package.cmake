@@ -1,5 +1,6 @@
-# Debian packages by `cpack` (scripts/package): mbverify with run-time dependencies only, and
-# libmbverify-dev with headers, libraries and the CMake package for own closed forms.
+# Debian packages by `cpack` (scripts/package): mbverify with run-time dependencies only,
+# libmbverify-dev with headers, libraries and the CMake package for own closed forms, and
+# python3-mbverify.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME mbverify)
 set(CPACK_PACKAGE_VENDOR mbverify)
@@ -38,6 +39,23 @@ set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
  Headers, static libraries and the CMake package of mbverify, for programs with
  closed forms of their own mechanisms.")
 
+set(packages "runtime mbverify" "development libmbverify-dev")
+if(MBV_WITH_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  list(APPEND packages "python python3-mbverify")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-mbverify)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+  math(EXPR next "${Python3_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "mbverify (= ${PROJECT_VERSION}-1), python3 (>= 3.${Python3_VERSION_MINOR}~), python3 (<< 3.${next}~), python3-numpy")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-pandas")
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION
+"verifier of the dynamics of closed-loop mechanisms (Python 3)
+ Poses, forces, Jacobians and mass matrices of closed-loop mechanisms as NumPy
+ arrays, and the program's verdicts as objects.")
+endif()
+
 # What Debian asks of every package: copyright, changelog, manual pages (made by scripts/package).
 string(TIMESTAMP date "%a, %d %b %Y 00:00:00 +0000" UTC)
 file(WRITE ${CMAKE_BINARY_DIR}/package/changelog
@@ -48,7 +66,7 @@ file(WRITE ${CMAKE_BINARY_DIR}/package/changelog
  -- ${CPACK_PACKAGE_CONTACT}  ${date}
 ")
 execute_process(COMMAND gzip -9nf ${CMAKE_BINARY_DIR}/package/changelog)
-foreach(pair "runtime mbverify" "development libmbverify-dev")
+foreach(pair ${packages})
   separate_arguments(pair)
   list(GET pair 0 component)
   list(GET pair 1 package)

@@ -15,6 +15,7 @@ const LIBRARIES = {
   'matio': { headers: ['matio.h'], target: 'PkgConfig::MATIO' },
   'Pango': { headers: ['pango/'], target: 'PkgConfig::PANGO' },
   'OSMesa': { headers: ['GL/'], target: '${CMAKE_DL_LIBS}' },  // loaded at run time
+  'pybind11': { headers: ['pybind11/'], target: 'pybind11::module' },
   'SQLite': { headers: ['sqlite3'], target: 'SQLite::SQLite3' },
   'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },
   'KLU': { headers: ['suitesparse/'], target: 'KLU::KLU' },
@@ -44,10 +45,10 @@ function readTable(text) {
   return layers;
 }
 
-// mbv_layer(folder … DEPS … LIBS …) → folder: {deps, libs}.
+// mbv_layer(folder … DEPS … LIBS …), mbv_module(the same) → folder: {deps, libs}.
 function readCmake(text) {
   const layers = {};
-  for (const call of text.replace(/#.*/g, '').matchAll(/mbv_layer\(([^)]*)\)/g)) {
+  for (const call of text.replace(/#.*/g, '').matchAll(/mbv_(?:layer|module)\(([^)]*)\)/g)) {
     const [folder, ...words] = call[1].trim().split(/\s+/);
     const lists = { deps: [], libs: [] };
     let into = null;
@@ -63,6 +64,7 @@ function readCmake(text) {
 
 // src/<room>/… or src/features/<product>/…
 function roomOf(path) {
+  if (path.startsWith('mbverify/')) return 'features/library';  // include/mbverify
   const parts = path.split('/');
   return parts[0] === 'features' && parts.length > 2 ? `features/${parts[1]}` : parts[0];
 }

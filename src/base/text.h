@@ -45,6 +45,15 @@ namespace mbv {
 
 [[nodiscard]] bool Contains(const std::vector<std::string>& words, std::string_view word);
 
+/// Of bodies, joints, parameters … all that have a `name`.
+template <typename T>
+[[nodiscard]] std::vector<std::string> NamesOf(const std::vector<T>& items) {
+  std::vector<std::string> names;
+  names.reserve(items.size());
+  for (const T& item : items) names.push_back(item.name);
+  return names;
+}
+
 // Text to read, broken into lines that fit.
 
 /// Columns of a terminal that a line takes: UTF-8, where escape sequences take none.

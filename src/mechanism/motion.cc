@@ -1,6 +1,7 @@
 #include "mechanism/motion.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "math/spatial.h"
 
@@ -31,6 +32,40 @@ bool IsLength(const Mechanism& mechanism, const Coordinate& coordinate) {
 
 std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate) {
   return IsLength(mechanism, coordinate) ? "m" : "rad";
+}
+
+std::vector<NamedCoordinate> NamedCommandCoordinates(const Mechanism& mechanism) {
+  using Kind = Coordinate::Kind;
+  std::vector<NamedCoordinate> named;
+  const auto add = [&](std::string name, Kind kind, size_t index, int component) {
+    named.push_back({std::move(name), {kind, static_cast<int>(index), component}});
+  };
+  for (size_t p = 0; p < mechanism.prescribed.size(); ++p) {
+    add(mechanism.prescribed[p].name, Kind::kPrescribed, p, 0);
+  }
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    add(mechanism.drives[d].name, Kind::kDrive, d, 0);
+  }
+  for (size_t o = 0; o < mechanism.outputs.size(); ++o) {
+    int component = 0;
+    for (const char* c : kPoseComponents) {
+      add(mechanism.outputs[o].name + "." + c, Kind::kOutput, o, component++);
+    }
+  }
+  return named;
+}
+
+std::vector<NamedCoordinate> NamedJointCoordinates(const Mechanism& mechanism) {
+  std::vector<NamedCoordinate> named;
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
+    const int dofs = DofsOf(joint.kind);
+    for (int c = 0; c < dofs; ++c) {
+      named.push_back({dofs == 1 ? joint.name : joint.name + "." + std::to_string(c),
+                       {Coordinate::Kind::kJoint, static_cast<int>(j), c}});
+    }
+  }
+  return named;
 }
 
 double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {

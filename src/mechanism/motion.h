@@ -50,6 +50,16 @@ struct Coordinate {
 /// Its value at the mechanism's home pose [m or rad].
 [[nodiscard]] double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate);
 
+struct NamedCoordinate {
+  std::string name;
+  Coordinate coordinate;
+};
+/// What a command may name: prescribed joints, drives, OUTPUT.x … OUTPUT.yaw.
+[[nodiscard]] std::vector<NamedCoordinate> NamedCommandCoordinates(const Mechanism& mechanism);
+/// Coordinates of joints: JOINT, or JOINT.0, JOINT.1 … where one has several. Prescribed joints
+/// and drives may have the names of theirs.
+[[nodiscard]] std::vector<NamedCoordinate> NamedJointCoordinates(const Mechanism& mechanism);
+
 /// Σ factor · coordinate = profile(t). Most commands have one term with factor 1; a coupling such
 /// as "these two drives are equally long" is a difference commanded to zero.
 struct Command {

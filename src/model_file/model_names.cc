@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "base/text.h"
 #include "model_file/model_bodies.h"
 #include "model_file/model_joints.h"
 
@@ -19,14 +20,6 @@ std::vector<std::string> ShortNames(const std::vector<std::string>& names,
     if (name.starts_with(levels.front())) result.push_back(name.substr(levels.front().size()));
   }
   return result;
-}
-
-template <typename T>
-std::vector<std::string> NamesOf(const std::vector<T>& items) {
-  std::vector<std::string> names;
-  names.reserve(items.size());
-  for (const T& item : items) names.push_back(item.name);
-  return names;
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ constexpr double kOpen = 1e-9;
 constexpr double kRoundOff = 1e-2;
 // A step that is round-off itself [rad, characteristic lengths]: rows are not evaluated again.
 constexpr double kNoStep = 1e-14;
-constexpr double kStepFromHome = 0.1;  ///< [rad, characteristic lengths], by the tangent
+constexpr double kFirstStep = 0.1;   ///< [rad, characteristic lengths], by the tangent
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -92,6 +92,7 @@ ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
 }
 
 void ClosureSolver::EvaluateRows(Trial* trial) {
+  rows_are_here_ = false;
   rows_.Clear();
   for (const Joint& joint : mechanism_.joints) {
     const ConstraintRows rows = RowsOf(joint, trial->states, false);
@@ -220,6 +221,7 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
 }
 
 void ClosureSolver::Accept(const VecX& target, Trial* trial) {
+  rows_are_here_ = false;
   std::swap(states_, trial->states);
   FollowElements(mechanism_, &states_);
   FollowDriven(mechanism_, &states_);
@@ -229,12 +231,14 @@ void ClosureSolver::Accept(const VecX& target, Trial* trial) {
   orientation_ = system_.determinant_sign();
 }
 
-int ClosureSolver::StepsFromHome(const VecX& target) {
+int ClosureSolver::StepsTo(const VecX& target, VecX* tangent) {
+  if (!rows_are_here_) EvaluateHere();
   if (!system_.Factor(rows_, selection_, selection_is_new_)) return options_.homotopy_steps;
   selection_is_new_ = false;
   VecX rates = VecX::Zero(system_.size());
   rates.tail(target.size()) = target - target_;
-  const double steps = std::ceil(SizeOf(system_.SolveTransposed(rates), length_) / kStepFromHome);
+  *tangent = system_.SolveTransposed(rates);
+  const double steps = std::ceil(SizeOf(*tangent, length_) / kFirstStep);
   if (!(steps < options_.homotopy_steps)) return options_.homotopy_steps;
   return std::max(1, static_cast<int>(steps));
 }
@@ -344,7 +348,8 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   // Extrapolate the previous sample; where that does not lead, follow the commands in steps.
   const double dt = command.time_s - predictor_.last_s();
   bool done = false;
-  if (!first && dt > 0.0 && std::isfinite(dt)) {
+  const bool predict = !first && dt > 0.0 && std::isfinite(dt);
+  if (predict) {
     trial_.states = states_;
     trial_.near_values = near_values_;
     PredictTurns(mechanism_, dt, &trial_.states);
@@ -358,8 +363,24 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
       done = true;
     }
   }
+  // Asked for one pose or another, without a time between: along the tangent, if that is short.
+  if (!predict && !first && target == target_) done = true;
+  int steps = 4;
+  if (!predict && !done) {
+    VecX tangent;
+    steps = StepsTo(target, &tangent);
+    if (!first && steps == 1) {
+      trial_.states = states_;
+      trial_.near_values = near_values_;
+      MoveBodies(tangent, &trial_.states);
+      if (Newton(target, true, &trial_) == Step::kDone) {
+        Accept(target, &trial_);
+        done = true;
+      }
+    }
+  }
   RunSummary summary = RunSummary::Done();
-  if (!done) summary = Follow(target, first ? StepsFromHome(target) : 4);
+  if (!done) summary = Follow(target, steps);
   if (first && summary.ok()) summary = TakeLeastTurns();
   if (first && summary.ok()) StartAngles(mechanism_, followed_, &states_);
   if (summary.ok()) summary = CheckPose();
@@ -570,6 +591,7 @@ namespace {
 constexpr double kRatesMiss = 4 * kEps;
 // Solutions go on below it, but while that helps; what misses more than the second is wrong.
 constexpr double kRatesGood = 1e-12, kRatesAccurate = 1e-9;
+constexpr double kBiasRounding = 32 * kEps;
 constexpr int kMostSolutions = 12;
 // Velocities that missed by more when the biases were evaluated have changed these.
 constexpr double kRatesSettled = 1e-13;
@@ -604,7 +626,8 @@ void ClosureSolver::AddMissing(std::vector<Vec6>* per_body) {
 }
 
 // The factors belong to a pose nearby; refinement against the true rows restores all digits.
-ClosureSolver::Refinement ClosureSolver::Refine(const VecX& rates, std::vector<Vec6>* per_body) {
+ClosureSolver::Refinement ClosureSolver::Refine(const VecX& rates, double round_off,
+                                                std::vector<Vec6>* per_body) {
   double scale = 0.0;
   for (const int i : selection_) {
     scale = std::max(scale, std::abs(rates[i]) / system_.RateUnit(rows_.angular[i]));
@@ -619,9 +642,9 @@ ClosureSolver::Refinement ClosureSolver::Refine(const VecX& rates, std::vector<V
       refinement.accurate = true;
       break;
     }
-    refinement.accurate = largest <= kRatesAccurate * scale;
+    refinement.accurate = largest <= std::max(kRatesAccurate * scale, round_off);
     if (largest <= kRatesMiss * scale || solutions == kMostSolutions) break;
-    if (largest < kRatesGood * scale && largest > 0.1 * previous) break;
+    if (largest < std::max(kRatesGood * scale, round_off) && largest > 0.1 * previous) break;
     AddMissing(per_body);
     previous = largest;
   }
@@ -642,11 +665,16 @@ RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
     Miss(rates_, states_.V_WB);
     AddMissing(&states_.V_WB);
     EvaluateHere();
-    const Refinement velocity = Refine(rates_, &states_.V_WB);
+    const Refinement velocity = Refine(rates_, 0.0, &states_.V_WB);
     if (!velocity.began_settled) EvaluateHere();
     PutAtEnd(command.acceleration, rows_.size() - joint_rows_, &rates_);
     rates_ -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
-    const Refinement acceleration = Refine(rates_, &states_.A_WB);
+    // What is left of biases that cancel is round-off of their terms, which are products of rates.
+    double speed = 0.0;
+    for (const Vec6& V : states_.V_WB) {
+      speed = std::max({speed, V.head<3>().norm(), V.tail<3>().norm() / length_});
+    }
+    const Refinement acceleration = Refine(rates_, kBiasRounding * speed * speed, &states_.A_WB);
     if (velocity.accurate && acceleration.accurate) return RunSummary::Done();
   }
   const double sigma = system_.SmallestSingularValue(3);
@@ -659,11 +687,30 @@ RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
   return summary;
 }
 
+RunSummary ClosureSolver::UnitMotions(int count, MatX* motions) {
+  motions->resize(system_.size(), count);
+  std::vector<Vec6> twists(mechanism_.bodies.size(), Vec6::Zero());
+  for (const bool refactor : {false, true}) {
+    if (refactor && !system_.Factor(rows_, selection_, false)) break;
+    bool accurate = true;
+    for (int k = 0; k < count && accurate; ++k) {
+      rates_.setZero(rows_.size());
+      rates_[joint_rows_ + k] = 1.0;
+      std::ranges::fill(twists, Vec6::Zero());
+      accurate = Refine(rates_, 0.0, &twists).accurate;
+      motions->col(k) = Stack(twists);
+    }
+    if (accurate) return RunSummary::Done();
+  }
+  return Singular("the coordinates do not determine the motion at this pose");
+}
+
 // Rows at the pose found; biases depend on the velocities.
 void ClosureSolver::EvaluateHere() {
   trial_.states = states_;
   trial_.near_values = near_values_;
   EvaluateRows(&trial_);
+  rows_are_here_ = true;
 }
 
 RunSummary ClosureSolver::TurnBack(const std::vector<double>& turns) {

@@ -33,6 +33,11 @@ class ClosureSolver {
   [[nodiscard]] RunSummary Solve(const CommandSample& command);
 
   [[nodiscard]] const BodyStates& states() const { return states_; }
+
+  /// Other velocities and accelerations at the pose of states().
+  [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
+  /// Twists of the moving bodies, stacked, per unit rate of each of the first `count` commands.
+  [[nodiscard]] RunSummary UnitMotions(int count, MatX* motions);
   /// Largest translation and rotation residual over all joints.
   [[nodiscard]] double gap_position_m() const { return gap_position_m_; }
   [[nodiscard]] double gap_rotation_rad() const { return gap_rotation_rad_; }
@@ -58,9 +63,9 @@ class ClosureSolver {
   }
   [[nodiscard]] Step Newton(const VecX& target, bool limit_step, Trial* trial);
   [[nodiscard]] RunSummary Follow(const VecX& target, int first_steps);
-  /// Into how many steps the way from home is cut first: by the motion that the bodies begin it
-  /// with. At home, its rows evaluated.
-  [[nodiscard]] int StepsFromHome(const VecX& target);
+  /// Into how many steps a way is cut first: by the motion that the bodies begin it with,
+  /// `tangent`, which would be the whole way were it straight.
+  [[nodiscard]] int StepsTo(const VecX& target, VecX* tangent);
   /// The determinant has changed its sign since the last pose.
   [[nodiscard]] bool Turned() const {
     return orientation_ != 0 && system_.determinant_sign() != orientation_;
@@ -80,7 +85,6 @@ class ClosureSolver {
   [[nodiscard]] RunSummary CheckPose();
   [[nodiscard]] RunSummary CheckHere();
   void EvaluateHere();
-  [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
   /// What the selected rows miss of the rates, into missing_; the largest [rad, characteristic
   /// lengths].
   double Miss(const VecX& rates, const std::vector<Vec6>& per_body);
@@ -89,8 +93,9 @@ class ClosureSolver {
   struct Refinement {
     bool began_settled = false, accurate = false;
   };
-  /// Solves the selected rows for the bodies' motions, from those at hand.
-  Refinement Refine(const VecX& rates, std::vector<Vec6>* per_body);
+  /// Solves the selected rows for the bodies' motions, from those at hand. Misses of `round_off`
+  /// [1/s of angles, characteristic lengths per s, or these per s] are none.
+  Refinement Refine(const VecX& rates, double round_off, std::vector<Vec6>* per_body);
   [[nodiscard]] RunSummary Singular(const std::string& why) const;
   /// Exchanges states and turns with those of the trial.
   void Accept(const VecX& target, Trial* trial);
@@ -108,7 +113,8 @@ class ClosureSolver {
   std::vector<double> coupled_size_;  ///< per coupling: its largest piece, for rounding
   std::vector<int> selection_;
   bool selection_is_new_ = true;
-  int orientation_ = 0;  ///< sign of the determinant on this branch
+  bool rows_are_here_ = false;  ///< rows_ are those of states_, but for biases
+  int orientation_ = 0;         ///< sign of the determinant on this branch
 
   BodyStates states_;
   std::vector<std::vector<double>> near_values_;

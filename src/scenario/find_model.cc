@@ -1,5 +1,7 @@
 #include "scenario/find_model.h"
 
+#include <dlfcn.h>
+
 #include <cstdlib>
 #include <set>
 
@@ -21,18 +23,35 @@ bool IsFolder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// The folder with the models and scenarios that the running program came with: <prefix>/share/
-// mbverify of <prefix>/bin/mbverify, or the source tree that it was built in.
-std::optional<fs::path> ShippedFolder() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (error) return std::nullopt;
-  const fs::path share = program.parent_path().parent_path() / "share" / "mbverify";
-  if (IsFolder(share / "models")) return share;
-  for (fs::path folder = program.parent_path();; folder = folder.parent_path()) {
+// A folder with models above a file: <prefix>/share/mbverify of what is installed below <prefix>,
+// or a source tree.
+std::optional<fs::path> ShippedAbove(const fs::path& file) {
+  for (fs::path folder = file.parent_path();; folder = folder.parent_path()) {
+    const fs::path share = folder / "share" / "mbverify";
+    if (IsFolder(share / "models")) return share;
     if (IsFolder(folder / "models") && IsFolder(folder / "scenarios")) return folder;
     if (folder == folder.parent_path()) return std::nullopt;
   }
+}
+
+// The folder with the models and scenarios that the running program came with, or the library that
+// this is a part of (without /proc the program as well); else those of the installation.
+std::optional<fs::path> ShippedFolder() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (!error) {
+    if (std::optional<fs::path> folder = ShippedAbove(program)) return folder;
+  }
+  Dl_info here;
+  if (dladdr(reinterpret_cast<const void*>(&ShippedFolder), &here) != 0 &&
+      here.dli_fname != nullptr) {
+    const fs::path object = fs::canonical(here.dli_fname, error);
+    if (!error) {
+      if (std::optional<fs::path> folder = ShippedAbove(object)) return folder;
+    }
+  }
+  const fs::path installed = internal::kInstalledData;
+  return IsFolder(installed / "models") ? std::optional(installed) : std::nullopt;
 }
 
 bool IsModelPath(const std::string& name) {

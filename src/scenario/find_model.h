@@ -8,6 +8,10 @@
 
 namespace mbv {
 
+namespace internal {
+extern const char* const kInstalledData;  ///< <prefix>/share/mbverify, as it was configured
+}  // namespace internal
+
 /// Folders searched for models/<name>/model.yaml, best first: "models" beside the start folder and
 /// beside each folder above it, $MBVERIFY_MODELS, ./models, and ShippedModels().
 [[nodiscard]] std::vector<std::filesystem::path> ModelFolders(const std::filesystem::path& start);
@@ -33,8 +37,8 @@ namespace mbv {
 /// there is none.
 [[nodiscard]] std::optional<std::filesystem::path> ScenariosFolder();
 
-/// The models that the running program came with: the installed ones, or those of the source tree
-/// that the program was built in; empty if there are none.
+/// The models that the running program or this library came with: the installed ones, or those of
+/// the source tree that it was built in; empty if there are none.
 [[nodiscard]] std::optional<std::filesystem::path> ShippedModels();
 
 /// `path` relative to the current folder if it lies below it, else as it is.

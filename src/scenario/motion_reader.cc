@@ -24,27 +24,15 @@ namespace {
 
 // Forward dynamics in scenario files: `forces:`, `motion.initial` and `motion.initial_rates`.
 
-struct NamedCoordinate {
-  std::string name;
-  Coordinate coordinate;
-};
-/// What a state is made of, by name: drives, OUTPUT.x … OUTPUT.yaw, JOINT, and JOINT.0, JOINT.1 …
-/// where a joint has several.
-[[nodiscard]] std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism);
-
 constexpr size_t kMostNames = 12;  // in one message
 
-// Joint coordinates by name: JOINT, or JOINT.0, JOINT.1 … where a joint has several.
-std::vector<NamedCoordinate> JointCoordinates(const Mechanism& mechanism) {
-  std::vector<NamedCoordinate> named;
-  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
-    const Joint& joint = mechanism.joints[j];
-    const int dofs = DofsOf(joint.kind);
-    for (int c = 0; c < dofs; ++c) {
-      named.push_back({dofs == 1 ? joint.name : fmt::format("{}.{}", joint.name, c),
-                       {Coordinate::Kind::kJoint, static_cast<int>(j), c}});
-    }
-  }
+// What a state is made of: drives, OUTPUT.x … OUTPUT.yaw, and joints, prescribed ones among them.
+std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism) {
+  std::vector<NamedCoordinate> named = NamedCommandCoordinates(mechanism);
+  std::erase_if(named, [](const NamedCoordinate& one) {
+    return one.coordinate.kind == Coordinate::Kind::kPrescribed;
+  });
+  std::ranges::move(NamedJointCoordinates(mechanism), std::back_inserter(named));
   return named;
 }
 
@@ -57,7 +45,7 @@ class FreeMotionReader {
   FreeMotionReader(ValueReader* values, const Mechanism& mechanism, ProfileTables* tables,
                    Motion* motion)
       : values_(values), mechanism_(mechanism), tables_(tables), motion_(motion) {
-    for (NamedCoordinate& named : StateCoordinates(mechanism)) known_.push_back(std::move(named));
+    known_ = StateCoordinates(mechanism);
   }
 
   void Read(const YamlNode& node, const YamlNode* forces) {
@@ -209,7 +197,7 @@ class FreeMotionReader {
       return;
     }
     std::vector<Command> candidates;
-    const std::vector<NamedCoordinate> joints = JointCoordinates(mechanism_);
+    const std::vector<NamedCoordinate> joints = NamedJointCoordinates(mechanism_);
     candidates.reserve(joints.size());
     for (const NamedCoordinate& joint : joints) {
       candidates.push_back(AsCommand(joint.name, joint.coordinate));
@@ -230,22 +218,6 @@ class FreeMotionReader {
   std::vector<NamedCoordinate> known_;
 };
 
-std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism) {
-  std::vector<NamedCoordinate> named;
-  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
-    named.push_back({mechanism.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
-  }
-  for (size_t o = 0; o < mechanism.outputs.size(); ++o) {
-    int component = 0;
-    for (const char* c : kPoseComponents) {
-      named.push_back({mechanism.outputs[o].name + "." + c,
-                       {Coordinate::Kind::kOutput, static_cast<int>(o), component++}});
-    }
-  }
-  for (NamedCoordinate& joint : JointCoordinates(mechanism)) named.push_back(std::move(joint));
-  return named;
-}
-
 // True when the scenario leaves DOFs to forces.
 bool IsFree(const YamlNode* motion, const YamlNode* forces) {
   if (forces != nullptr) return true;
@@ -262,25 +234,6 @@ void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlN
 }
 
 }  // namespace
-std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
-  std::vector<std::string> names;
-  for (const Prescribed& p : mechanism.prescribed) names.push_back(p.name);
-  for (const Drive& d : mechanism.drives) names.push_back(d.name);
-  for (const Output& o : mechanism.outputs) {
-    for (const char* c : kPoseComponents) names.push_back(o.name + "." + c);
-  }
-  return names;
-}
-
-Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
-  using Kind = Coordinate::Kind;
-  if (k < mechanism.prescribed.size()) return {Kind::kPrescribed, static_cast<int>(k), 0};
-  k -= mechanism.prescribed.size();
-  if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
-  k -= mechanism.drives.size();
-  return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
-}
-
 std::optional<PolylinePlan> ReadBlendedPlan(ValueReader* values, const YamlMap& map) {
   YamlReader& yaml = values->yaml();
   PolylinePlan plan;
@@ -456,7 +409,7 @@ class MotionReader {
       : values_(values),
         mechanism_(mechanism),
         otherwise_(otherwise),
-        names_(CoordinateNames(mechanism)),
+        known_(NamedCommandCoordinates(mechanism)),
         tables_{.mechanism = &mechanism, .files = files} {}
 
   Motion Read(const YamlNode* node, const YamlNode* loads, const YamlNode* forces) {
@@ -545,15 +498,14 @@ class MotionReader {
 
   // A coordinate by name; a finding names the closest one.
   std::optional<Coordinate> FindCoordinate(const YamlEntry& entry, const std::string& path) {
-    const auto found = std::find(names_.begin(), names_.end(), entry.key);
-    if (found != names_.end()) {
-      return CoordinateAt(mechanism_, static_cast<size_t>(found - names_.begin()));
-    }
+    const auto found = std::ranges::find(known_, entry.key, &NamedCoordinate::name);
+    if (found != known_.end()) return found->coordinate;
+    const std::vector<std::string> names = NamesOf(known_);
     yaml().Error(entry,
                  fmt::format("{}: {} has no coordinate '{}'", path, mechanism_.name, entry.key),
-                 DidYouMean(entry.key, names_,
+                 DidYouMean(entry.key, names,
                             "known: prescribed joints, drives, and OUTPUT.x … OUTPUT.yaw: " +
-                                Joined(names_, 12)));
+                                Joined(names, kMostNames)));
     return {};
   }
 
@@ -815,7 +767,7 @@ class MotionReader {
   ValueReader* values_;
   const Mechanism& mechanism_;
   const MotionTimes otherwise_;
-  std::vector<std::string> names_;
+  std::vector<NamedCoordinate> known_;
   ProfileTables tables_;
   Motion motion_;
   bool times_known_ = false;

@@ -10,14 +10,7 @@
 #include "mechanism/motion.h"
 #include "model_file/yaml/value_reader.h"
 
-// What a scenario may command, by name.
-
 namespace mbv {
-
-/// Names a command may use: prescribed joints, drives, output components ("platform.yaw").
-[[nodiscard]] std::vector<std::string> CoordinateNames(const Mechanism& mechanism);
-/// The k-th of these names as a coordinate.
-[[nodiscard]] Coordinate CoordinateAt(const Mechanism& mechanism, size_t k);
 
 // Keys of `motion.path` with `blend`: polylines with rounded corners.
 

@@ -31,3 +31,10 @@ if build/my_mbverify run turn.yaml --quiet --no-pictures \
 grep -q 'takes the command' ../refused.log
 # The regression's workers are this program too.
 build/my_mbverify regress turn.yaml --no-pictures --no-history --quiet --out ../regression
+# A program that calls the solver object: its legs carry the platform and lift it.
+cp -r "$source/examples/solver" "$work/solver"
+cd "$work/solver"
+"$cmake" -S . -B build -G Ninja -DCMAKE_PREFIX_PATH="$work/prefix" >configure.log
+"$cmake" --build build >build.log 2>&1 || { cat build.log >&2; exit 1; }
+MBVERIFY_MODELS="$work/prefix/share/mbverify/models" build/lift >forces.txt
+awk 'NF != 6 { exit 1 } { for (i = 1; i <= 6; ++i) if (!($i > 0)) exit 1 }' forces.txt

@@ -294,15 +294,13 @@ std::variant<std::string, Finding> FindElasticModel(const std::string& name,
 }
 
 Motion PoseMotion(const Mechanism& mechanism, const PoseValues& pose) {
-  const std::vector<std::string> names = CoordinateNames(mechanism);
+  const std::vector<NamedCoordinate> known = NamedCommandCoordinates(mechanism);
   Motion motion;
   for (const auto& [name, value] : pose) {
-    const auto found = std::find(names.begin(), names.end(), name);
-    MBV_DEMAND(found != names.end(), name);
-    const Coordinate coordinate =
-        CoordinateAt(mechanism, static_cast<size_t>(found - names.begin()));
+    const auto found = std::ranges::find(known, name, &NamedCoordinate::name);
+    MBV_DEMAND(found != known.end(), name);
     motion.commands.push_back(
-        {.name = name, .terms = {{coordinate, 1.0}}, .profile = Constant(value)});
+        {.name = name, .terms = {{found->coordinate, 1.0}}, .profile = Constant(value)});
   }
   return motion;
 }
@@ -324,7 +322,7 @@ std::optional<Finding> PutIntoPose(const Mechanism& mechanism, const std::string
                                    std::optional<double> number, PoseValues* pose,
                                    Overrides* parameters) {
   const auto [name, unit] = SplitUnit(key);
-  std::vector<std::string> known = CoordinateNames(mechanism);
+  std::vector<std::string> known = NamesOf(NamedCommandCoordinates(mechanism));
   const bool coordinate = Contains(known, name), parameter = mechanism.HasParameter(name);
   if (!coordinate && !parameter) {
     for (const Parameter& p : mechanism.parameters) known.push_back(p.name);
@@ -350,7 +348,7 @@ std::optional<Finding> CheckElastic(const Mechanism& mechanism, const std::strin
 }
 
 std::optional<Finding> CheckPose(const Mechanism& mechanism, const PoseValues& pose) {
-  const std::vector<std::string> names = CoordinateNames(mechanism);
+  const std::vector<std::string> names = NamesOf(NamedCommandCoordinates(mechanism));
   for (const auto& [name, value] : pose) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     return Finding{.message = fmt::format("pose: {} has no coordinate '{}'", mechanism.name, name),

@@ -63,8 +63,8 @@ struct StiffnessScenarioResult {
 [[nodiscard]] std::variant<std::string, Finding> FindElasticModel(const std::string& name,
                                                                   const std::string& start);
 
-/// A pose as constant commands, for loop closure. The names must be CoordinateNames()
-/// (coordinate_names.h).
+/// A pose as constant commands, for loop closure. The names must be among
+/// NamedCommandCoordinates().
 [[nodiscard]] Motion PoseMotion(const Mechanism& mechanism, const PoseValues& pose);
 
 /// The values of all drives at the home pose.

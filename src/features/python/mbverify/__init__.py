@@ -1,0 +1,56 @@
+"""Verifies multibody models of closed-loop mechanisms, and asks them for poses and forces.
+
+    import mbverify
+
+    result = mbverify.run("spr_tripod/static")        # what `mbverify run` does
+    solver = mbverify.load("stewart").solver()        # the solver object, in the drives
+    forces = solver.inverse_dynamics(solver.home)     # of this state
+
+SI units and radians. `run`, `audit`, `study` and `figures` start the program: their results are its
+files, and a file that ends the program ends no interpreter.
+"""
+
+from ._native import (
+    ConvergenceError,
+    Finding,
+    Forces,
+    InputError,
+    Model,
+    SingularError,
+    Solver,
+    SolverError,
+    State,
+    UnreachableError,
+    UnsupportedError,
+    Wrench,
+    load,
+)
+from ._program import ProgramError, Result, StudyResult, audit, figures, program, run, study
+
+__all__ = [
+    "ConvergenceError",
+    "Finding",
+    "Forces",
+    "InputError",
+    "Model",
+    "ProgramError",
+    "Result",
+    "SingularError",
+    "Solver",
+    "SolverError",
+    "State",
+    "StudyResult",
+    "UnreachableError",
+    "UnsupportedError",
+    "Wrench",
+    "audit",
+    "figures",
+    "load",
+    "program",
+    "run",
+    "study",
+]
+
+# `mbverify.load("stewart").solver()`
+Model.solver = lambda self, coordinates=(): Solver(self, list(coordinates))
+Model.solver.__doc__ = Solver.__init__.__doc__

@@ -1,0 +1,260 @@
+"""Commands of the program, with their results as objects."""
+
+import csv
+import html
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import weakref
+
+import numpy
+
+from . import _native
+
+
+class ProgramError(RuntimeError):
+    """The program ended in a way that its results do not tell; `exit_code`, `text`."""
+
+    def __init__(self, message, exit_code, text):
+        super().__init__(message)
+        self.exit_code = exit_code
+        self.text = text
+
+
+def program():
+    """The path of the program `mbverify`: $MBVERIFY, the one that this package was built or
+    installed with, or the one on PATH."""
+    stated = os.environ.get("MBVERIFY")
+    if stated:
+        return stated
+    for folder in pathlib.Path(__file__).resolve().parents[1:]:
+        for candidate in (folder / "mbverify", folder / "bin" / "mbverify"):
+            if candidate.is_file() and os.access(candidate, os.X_OK):
+                return str(candidate)
+    found = shutil.which("mbverify")
+    if found:
+        return found
+    raise FileNotFoundError("the program mbverify is neither beside this package nor on PATH")
+
+
+def _findings_of(document):
+    """All findings of a command's JSON, wherever they are."""
+    found = []
+    if isinstance(document, dict):
+        found += [f for f in document.get("findings", []) if isinstance(f, dict)]
+        for key, value in document.items():
+            if key != "findings":
+                found += _findings_of(value)
+    elif isinstance(document, list):
+        for value in document:
+            found += _findings_of(value)
+    return found
+
+
+def _call(*arguments, allowed=(0, 1, 3), progress=False):
+    """Runs `mbverify ARGUMENTS… --json FILE`; its document, exit code and text."""
+    with tempfile.TemporaryDirectory(prefix="mbverify_") as folder:
+        file = os.path.join(folder, "result.json")
+        done = subprocess.run(
+            [program(), *map(str, arguments), "--json", file],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=None if progress else subprocess.PIPE,
+            check=False,
+        )
+        text = ((done.stderr or b"") + done.stdout).decode("utf-8", "replace")
+        document = None
+        if os.path.exists(file):
+            with open(file, encoding="utf-8") as stream:
+                document = json.load(stream)
+    if done.returncode == 2:
+        error = _native.InputError(text.strip())
+        error.findings = [
+            _native.Finding(
+                f["severity"] == "error", f["file"], f["line"], f["column"], f["message"], f["hint"]
+            )
+            for f in _findings_of(document)
+        ]
+        raise error
+    if document is None or done.returncode not in allowed:
+        how = f"signal {-done.returncode}" if done.returncode < 0 else f"code {done.returncode}"
+        raise ProgramError(f"mbverify ended with {how}: {text.strip()}", done.returncode, text)
+    return document, done.returncode, text
+
+
+class _Folder:
+    """Where results go: the caller's folder, or one that lives as long as this."""
+
+    def __init__(self, out):
+        self.path = pathlib.Path(out or tempfile.mkdtemp(prefix="mbverify_"))
+        if not out:
+            weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+
+
+def _set(values):
+    arguments = []
+    for key, value in (values or {}).items():
+        arguments += ["--set", f"{key}={value}"]
+    return arguments
+
+
+class Result:
+    """What `mbverify run` says of one scenario.
+
+    `summary` is its summary.json (docs/reference/json.md), `folder` the folder with its files.
+    """
+
+    def __init__(self, summary, folder, keep, text):
+        self.summary = summary
+        self.folder = folder
+        self.text = text
+        self._keep = keep
+        self._traces = None
+
+    @property
+    def verdict(self):
+        """'agree', 'disagree' or 'not_run'."""
+        return self.summary.get("verdict", "not_run")
+
+    @property
+    def passed(self):
+        return self.verdict == "agree"
+
+    @property
+    def checks(self):
+        """Each check: a dict with name, value, limit, pass, time_s, channel."""
+        return self.summary.get("checks", [])
+
+    @property
+    def worst(self):
+        """The check that is nearest to its limit, or farthest beyond it; None without checks."""
+        ratio = lambda check: float("inf") if check["value"] is None else check["value"] / check["limit"]
+        return max(self.checks, key=ratio, default=None)
+
+    @property
+    def traces(self):
+        """The columns of traces.csv by name, as arrays; `time_s` is the first."""
+        if self._traces is None:
+            with open(self.folder / "traces.csv", encoding="utf-8", newline="") as stream:
+                names = next(csv.reader(stream))
+                values = numpy.loadtxt(stream, delimiter=",", ndmin=2)
+            self._traces = {name: values[:, k] for k, name in enumerate(names)}
+        return self._traces
+
+    def to_pandas(self):
+        """The traces as a pandas.DataFrame with time_s as its index."""
+        import pandas
+
+        return pandas.DataFrame(self.traces).set_index("time_s")
+
+    def __repr__(self):
+        name = f"{self.summary.get('mechanism', '')}/{self.summary.get('scenario', '')}"
+        return f"<mbverify.Result {name}: {self.verdict}>"
+
+    def _repr_html_(self):
+        escape = lambda value: html.escape(str(value))
+        name = f"{self.summary.get('mechanism', '')}/{self.summary.get('scenario', '')}"
+        number = lambda value: "–" if value is None else f"{value:.3g}"
+        rows = "".join(
+            f"<tr><td>{'✓' if check['pass'] else '✗'}</td><td style='text-align:left'>"
+            f"{escape(check['name'])}</td><td>{number(check['value'])}</td>"
+            f"<td>{number(check['limit'])}</td><td style='text-align:left'>"
+            f"{escape(check['channel'])}</td></tr>"
+            for check in self.checks
+        )
+        caveats = "".join(f"<li>{escape(c['text'])}</li>" for c in self.summary.get("caveats", []))
+        colour = {"agree": "#1a7f37", "disagree": "#b42318"}.get(self.verdict, "#8a6d00")
+        return (
+            f"<div><b style='color:{colour}'>{escape(self.verdict.upper().replace('_', ' '))}</b> "
+            f"{escape(name)}<table><tr><th></th><th>check</th><th>value</th><th>limit</th>"
+            f"<th>where</th></tr>{rows}</table>"
+            + (f"<ul>{caveats}</ul>" if caveats else "")
+            + "</div>"
+        )
+
+
+def run(scenario, *, set=None, out=None, pictures=False, trust=False, progress=False):
+    """Runs a scenario, a robot's file (URDF, MJCF) or a stiffness file; its Result.
+
+    `set`: other values, as `--set` takes them: {"simulation.step_s": 0.0005}. `out`: the folder for
+    the results; without it they live as long as the Result. `trust`: programs that the scenario
+    names may run. Raises InputError for bad input; a scenario that cannot run is a Result with
+    verdict 'not_run'.
+    """
+    folder = _Folder(out)
+    document, _, text = _call(
+        "run",
+        scenario,
+        *_set(set),
+        "--out",
+        folder.path,
+        *([] if pictures else ["--no-pictures"]),
+        *(["--trust"] if trust else []),
+        progress=progress,
+    )
+    results = document["results"]
+    if len(results) != 1:
+        raise ValueError(f"{scenario} names {len(results)} scenarios: run() takes one")
+    summary = results[0]
+    place = folder.path / summary["mechanism"] / summary["scenario"]
+    return Result(summary, place, folder, text)
+
+
+def audit(model=None):
+    """Each equation of a paper as printed and as corrected: the document of `mbverify audit`."""
+    return _call("audit", *([model] if model else []))[0]
+
+
+class StudyResult:
+    """What `mbverify study` says: `summary` is its summary.json, `folder` has its files."""
+
+    def __init__(self, summary, folder, keep, text):
+        self.summary = summary
+        self.folder = folder
+        self.text = text
+        self._keep = keep
+
+    @property
+    def quantities(self):
+        return self.summary.get("quantities", [])
+
+    def to_pandas(self):
+        """The points, one a row, as a pandas.DataFrame."""
+        import pandas
+
+        return pandas.read_csv(self.folder / "points.csv")
+
+
+def study(file, *, count=None, seed=None, jobs=None, out=None, progress=False):
+    """Runs a study; its StudyResult. `count` and `seed` instead of the file's, `jobs` processes
+    (all cores). Raises InputError for bad input."""
+    folder = _Folder(out)
+    options = []
+    for name, value in (("--count", count), ("--seed", seed), ("--jobs", jobs)):
+        if value is not None:
+            options += [name, value]
+    document, _, text = _call("study", file, *options, "--out", folder.path, progress=progress)
+    return StudyResult(document, folder.path / document["study"], folder, text)
+
+
+def figures(scenario, *, out, formats=("pdf", "svg"), style=None, only=()):
+    """Figures for a paper of a scenario, in the folder `out`: the paths of the files."""
+    document, _, _ = _call(
+        "figures",
+        scenario,
+        "--out",
+        out,
+        "--formats",
+        ",".join(formats),
+        *(["--style", style] if style else []),
+        *(["--only", *only] if only else []),
+    )
+    return [
+        pathlib.Path(result["folder"]) / file
+        for result in document["results"]
+        for figure in result["figures"]
+        for file in figure["files"]
+    ]

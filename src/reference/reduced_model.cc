@@ -1,0 +1,197 @@
+#include "reference/reduced_model.h"
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+#include <limits>
+#include <optional>
+
+#include "base/demand.h"
+#include "kinematics/constraints.h"
+#include "reference/closure_solver.h"
+#include "reference/element_forces.h"
+#include "reference/force_solver.h"
+#include "reference/motion_equations.h"
+#include "reference/sample_recorder.h"
+#include "reference/square_system.h"
+
+namespace mbv {
+namespace {
+
+// Mass matrices of worse condition, scaled to a diagonal of 1, are singular within round-off.
+constexpr double kLeastMass = 1e-14;
+
+// All coordinates as commands that stay at home. A duration says what is at rest (RestRate()).
+Motion MotionOf(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates) {
+  Motion motion;
+  for (const Coordinate& coordinate : coordinates) {
+    motion.commands.push_back({.name = "",
+                               .terms = {{coordinate, 1.0}},
+                               .profile = Constant(HomeValue(mechanism, coordinate))});
+  }
+  return motion;
+}
+
+}  // namespace
+
+struct ReducedModel::Impl {
+  Impl(const Mechanism& m, const std::vector<Coordinate>& coordinates)
+      : mechanism(m), motion(MotionOf(m, coordinates)) {
+    Begin();
+  }
+
+  void Begin() {
+    closure.emplace(mechanism, motion, ReferenceOptions{});
+    forces.emplace(mechanism, motion.duration_s);
+    recorder.emplace(mechanism);
+  }
+
+  const Mechanism& mechanism;
+  const Motion motion;
+  std::optional<internal::ClosureSolver> closure;
+  std::optional<internal::ForceSolver> forces;
+  std::optional<internal::SampleRecorder> recorder;
+  CommandSample command;
+  ReferenceSample sample;
+};
+
+ReducedModel::ReducedModel(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates)
+    : impl_(std::make_unique<Impl>(mechanism, coordinates)) {}
+ReducedModel::~ReducedModel() = default;
+ReducedModel::ReducedModel(ReducedModel&&) noexcept = default;
+
+Eigen::Index ReducedModel::size() const {
+  return static_cast<Eigen::Index>(impl_->motion.commands.size());
+}
+
+VecX ReducedModel::home() const {
+  VecX q(size());
+  for (Eigen::Index k = 0; k < q.size(); ++k) {
+    const Command& command = impl_->motion.commands[static_cast<size_t>(k)];
+    q[k] = HomeValue(impl_->mechanism, command.terms.front().coordinate);
+  }
+  return q;
+}
+
+void ReducedModel::Restart() { impl_->Begin(); }
+
+RunSummary ReducedModel::Move(const VecX& q, const VecX& v, const VecX& a) {
+  MBV_DEMAND(q.size() == size() && v.size() == size() && a.size() == size(), q.size());
+  CommandSample& command = impl_->command;
+  command.position = q;
+  command.velocity = v;
+  command.acceleration = a;
+  RunSummary summary = impl_->closure->Solve(command);
+  if (!summary.ok()) {
+    Restart();
+    summary.time_s = kNan;
+    return summary;
+  }
+  impl_->sample.states = impl_->closure->states();
+  impl_->recorder->Record(&impl_->sample);
+  return summary;
+}
+
+const BodyStates& ReducedModel::states() const { return impl_->sample.states; }
+const ReferenceSample& ReducedModel::sample() const { return impl_->sample; }
+
+RunSummary ReducedModel::Motions(MatX* T) {
+  return impl_->closure->UnitMotions(static_cast<int>(size()), T);
+}
+
+// (2) with a = 0 gives Σ H_ij v_i v_j for unit rates, alone and in pairs.
+RunSummary ReducedModel::Curvatures(MatX* H) {
+  internal::ClosureSolver& closure = *impl_->closure;
+  CommandSample command = impl_->command;
+  const Eigen::Index n = size();
+  command.acceleration.setZero();
+  RunSummary summary = RunSummary::Done();
+  const auto along = [&](Eigen::Index i, Eigen::Index j) {
+    command.velocity = VecX::Unit(n, i);
+    if (j != i) command.velocity[j] = 1.0;
+    if (summary.ok()) summary = closure.SolveRates(command);
+    return internal::Stack(closure.states().A_WB);
+  };
+  H->resize(6 * (static_cast<Eigen::Index>(impl_->mechanism.bodies.size()) - 1), n * n);
+  for (Eigen::Index i = 0; i < n; ++i) H->col(i * n + i) = along(i, i);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      H->col(i * n + j) = 0.5 * (along(i, j) - H->col(i * n + i) - H->col(j * n + j));
+      H->col(j * n + i) = H->col(i * n + j);
+    }
+  }
+  const RunSummary back = closure.SolveRates(impl_->command);
+  return summary.ok() ? back : summary;
+}
+
+MatX ReducedModel::MassMatrix(const MatX& T) const {
+  const MatX M = T.transpose() * internal::Momenta(impl_->mechanism, states(), T);
+  return 0.5 * (M + M.transpose());
+}
+
+const ForceElement* ReducedModel::friction_by_load() const {
+  for (const ForceElement& element : impl_->mechanism.elements) {
+    if (HasFriction(element) && std::get<FrictionLaw>(element.law).per_load() > 0.0) {
+      return &element;
+    }
+  }
+  return nullptr;
+}
+
+VecX ReducedModel::Forces(const MatX& T, const std::vector<LoadSample>& loads) {
+  std::vector<Vec6> required;
+  const std::vector<int> signs =
+      internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s);
+  internal::RequiredWrenches(impl_->mechanism, states(), loads, signs, &required);
+  return T.transpose() * internal::Stack(required);
+}
+
+RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSample>& loads,
+                                       const VecX& drive_forces, VecX* a) {
+  const Mechanism& mechanism = impl_->mechanism;
+  RunSummary summary;
+  const std::vector<int> signs =
+      internal::FrictionDirections(mechanism, states(), impl_->motion.duration_s);
+  const ForceElement* undetermined = friction_by_load();
+  const char* why = "has friction that grows with its load";
+  for (size_t e = 0; e < mechanism.elements.size() && undetermined == nullptr; ++e) {
+    if (!HasFriction(mechanism.elements[e]) || signs[e] != 0) continue;
+    undetermined = &mechanism.elements[e];
+    why = "rests with dry friction";
+  }
+  if (undetermined != nullptr) {
+    summary.stop = Stop::kUnsupported;
+    summary.where = mechanism.joints[static_cast<size_t>(undetermined->joint)].name;
+    summary.message = fmt::format("{} {}: a state alone does not determine accelerations",
+                                  Described(mechanism, *undetermined), why);
+    return summary;
+  }
+  // Coordinates in units of their own: lengths, angles, large and small masses.
+  const MatX M = MassMatrix(T);
+  const VecX scale =
+      M.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<MatX> mass(scale.asDiagonal() * M * scale.asDiagonal());
+  if (mass.info() != Eigen::Success || !(mass.rcond() > kLeastMass)) {
+    summary.stop = Stop::kSingular;
+    summary.message = "a motion of the coordinates moves no mass";
+    return summary;
+  }
+  const VecX rest = DriveRates(T).transpose() * drive_forces - Forces(T, loads);
+  *a = scale.cwiseProduct(mass.solve(scale.cwiseProduct(rest)));
+  return RunSummary::Done();
+}
+
+MatX ReducedModel::DriveRates(const MatX& T) const {
+  const Mechanism& mechanism = impl_->mechanism;
+  MatX rates(static_cast<Eigen::Index>(mechanism.drives.size()), T.cols());
+  for (Eigen::Index d = 0; d < rates.rows(); ++d) {
+    const ScalarRow row = DriveRow(mechanism, mechanism.drives[static_cast<size_t>(d)], states());
+    rates.row(d) = internal::GradientOf(row, mechanism.bodies.size()).transpose() * T;
+  }
+  return rates;
+}
+
+RunSummary ReducedModel::AllForces(const std::vector<LoadSample>& loads) {
+  return impl_->forces->Solve(loads, &impl_->sample);
+}
+
+}  // namespace mbv

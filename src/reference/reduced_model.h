@@ -1,0 +1,80 @@
+// The reduced model: a closed-loop mechanism as functions of chosen coordinates q, as many as it
+// has degrees of freedom. Everything else depends on them through the loops:
+//
+//   V = T v                                twists of all bodies, v = dq/dt                    (1)
+//   A = T a + Σ_ij H_ij v_i v_j            accelerations, a = dv/dt                           (2)
+//   M a + h = f,   M = Tᵀ 𝓜 T,  h = Tᵀ w(q, v, T-part of a = 0)                               (3)
+//
+// with 𝓜 the inertia of all bodies and rotors, w what Newton–Euler asks of each body beyond
+// gravity, springs, force elements and loads, and f the force along each coordinate. With J_d the
+// rates of the drives per unit of v, drive forces τ give f = J_dᵀ τ [García de Jalón, Bayo 1994,
+// ch. 5].
+//
+// Prescribed joints that are not among the coordinates stay at home. Stands on the reference's loop
+// closure and forces: no MuJoCo, no formula of a paper.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "base/run_summary.h"
+#include "base/types.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "reference/reference.h"
+
+namespace mbv {
+
+class ReducedModel {
+ public:
+  /// `coordinates`: independent of each other at home (ChooseCoordinates()), n of them. The
+  /// mechanism outlives the object.
+  ReducedModel(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates);
+  ~ReducedModel();
+  ReducedModel(ReducedModel&&) noexcept;
+
+  [[nodiscard]] Eigen::Index size() const;  ///< n
+  /// The coordinates at the home pose [m or rad].
+  [[nodiscard]] VecX home() const;
+
+  /// Closes the loops at q and moves with v and a [n each]: from the pose reached last, the first
+  /// time from home, by a way short enough that no assembly is changed. After a failure the next
+  /// call begins at home.
+  [[nodiscard]] RunSummary Move(const VecX& q, const VecX& v, const VecX& a);
+  /// Forgets the pose: the next call begins at home.
+  void Restart();
+
+  // Of the state that Move() reached last.
+
+  [[nodiscard]] const BodyStates& states() const;
+  /// Drives and prescribed joints, outputs: what ReferenceSample names so.
+  [[nodiscard]] const ReferenceSample& sample() const;
+  /// T of (1): 6·(bodies − 1) × n, [ω; v of Bo] of each moving body in world axes.
+  [[nodiscard]] RunSummary Motions(MatX* T);
+  /// H of (2): 6·(bodies − 1) × n·n, column i n + j; H_ij = H_ji.
+  [[nodiscard]] RunSummary Curvatures(MatX* H);
+  /// M of (3), n × n, symmetric.
+  [[nodiscard]] MatX MassMatrix(const MatX& T) const;
+  /// An element whose friction grows with the load on its joint, or nullptr. Such friction is no
+  /// function of the state: (3) is without it.
+  [[nodiscard]] const ForceElement* friction_by_load() const;
+  /// M a + h: the force along each coordinate [N or N m] that the state needs beyond the loads.
+  /// Friction at rest counts as 0.
+  [[nodiscard]] VecX Forces(const MatX& T, const std::vector<LoadSample>& loads);
+  /// (3) solved for a, with drive forces τ, where Move() was called with a = 0. kSingular where a
+  /// coordinate moves no mass; kUnsupported with dry friction at rest or by load, which leave a
+  /// choice (free_motion.h integrates those).
+  [[nodiscard]] RunSummary Accelerations(const MatX& T, const std::vector<LoadSample>& loads,
+                                         const VecX& drive_forces, VecX* a);
+  /// J_d: drives × n.
+  [[nodiscard]] MatX DriveRates(const MatX& T) const;
+  /// Forces of drives and prescribed joints and all reactions, in sample(); as the reference, the
+  /// least ones where the equations leave a choice.
+  [[nodiscard]] RunSummary AllForces(const std::vector<LoadSample>& loads);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace mbv

@@ -1,0 +1,345 @@
+"""The Python package: the solver object, and commands whose results are the program's."""
+
+import ast
+import gc
+import importlib.util
+import json
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import mbverify
+
+SOURCE = pathlib.Path(os.environ["MBV_SOURCE"])
+
+
+def model_file(name):
+    return str(SOURCE / "models" / name / "model.yaml")
+
+
+class TheSolver(unittest.TestCase):
+    def setUp(self):
+        self.model = mbverify.load("stewart")
+        self.solver = self.model.solver()
+
+    def test_names_its_model(self):
+        self.assertEqual(self.model.name, "stewart")
+        self.assertEqual(self.model.degrees_of_freedom, 6)
+        self.assertEqual(self.solver.coordinates, self.model.drives)
+        self.assertEqual(self.model.unit_of("platform.roll"), "rad")
+        self.assertIn("6 degrees of freedom", repr(self.model))
+
+    def test_moves_closes_and_balances(self):
+        q = self.solver.home + 0.01
+        v, a = np.linspace(-0.3, 0.3, 6), np.linspace(1, -1, 6)
+        state = self.solver.move(q, v, a)
+        np.testing.assert_allclose(state.drives, q, atol=1e-12)
+        np.testing.assert_allclose(state.drive_rates, v, atol=1e-12)
+        forces = self.solver.inverse_dynamics(q, v, a)
+        M, bias = self.solver.mass_matrix(q), self.solver.bias(q, v)
+        scale = abs(forces.drives).max()
+        np.testing.assert_allclose(M @ a + bias, forces.drives, atol=1e-9 * scale)
+        np.testing.assert_allclose(
+            self.solver.forward_dynamics(q, v, forces.drives), a, atol=1e-8
+        )
+        T, H = self.solver.derivatives(q)
+        self.assertEqual(H.shape, (T.shape[0], 6, 6))
+        accelerations = T @ a + np.einsum("kij,i,j->k", H, v, v)
+        np.testing.assert_allclose(accelerations, state.accelerations[1:].ravel(), atol=1e-9)
+        self.assertEqual(state.bodies.shape, (len(self.model.bodies), 4, 4))
+        platform = self.model.bodies.index("platform")
+        J = self.solver.jacobian(q, "platform")
+        moved = self.solver.close(q + 1e-6 * v).bodies[platform, :3, 3]
+        back = self.solver.close(q - 1e-6 * v).bodies[platform, :3, 3]
+        np.testing.assert_allclose((moved - back) / 2e-6, (J @ v)[3:], atol=1e-6)
+
+    def test_notices_a_perturbed_parameter(self):
+        home = self.solver.home
+        here = self.solver.inverse_dynamics(home).drives
+        noticed = 0
+        for name, value in self.model.parameters.items():
+            there = mbverify.load("stewart", {name: 1.0001 * value}).solver()
+            try:
+                noticed += abs(there.inverse_dynamics(home).drives - here).max() > 1e-7 * abs(here).max()
+            except mbverify.SolverError:
+                pass
+        self.assertGreater(noticed, 2)
+
+    def test_takes_loads(self):
+        home = self.solver.home
+        load = mbverify.Wrench("platform", force=[0, 0, -100])
+        change = (
+            self.solver.inverse_dynamics(home, loads=[load]).drives
+            - self.solver.inverse_dynamics(home).drives
+        )
+        J = self.solver.jacobian(home, "platform")
+        point = self.solver.close(home)  # the platform's origin: the output's frame is there
+        np.testing.assert_allclose(change, -J.T @ [0, 0, 0, 0, 0, -100], atol=1e-8)
+        self.assertEqual(len(point.drives), 6)
+
+    def test_rows_are_states(self):
+        generator = np.random.default_rng(1)
+        q = self.solver.home + 0.02 * generator.standard_normal((600, 6))
+        forces = self.solver.inverse_dynamics(q, threads=2)
+        np.testing.assert_array_equal(forces, self.solver.inverse_dynamics(q, threads=1))
+        for row in (0, 299, 599):
+            one = self.solver.inverse_dynamics(q[row]).drives
+            np.testing.assert_allclose(forces[row], one, rtol=1e-9)
+        np.testing.assert_allclose(self.solver.close(q), q, atol=1e-10)
+        # Any layout and type that NumPy can convert.
+        np.testing.assert_array_equal(self.solver.close(np.asfortranarray(q)), self.solver.close(q))
+
+    def test_rows_that_fail_are_named(self):
+        q = np.tile(self.solver.home, (10, 1))
+        q[3, 0] += 40
+        with self.assertRaises(mbverify.SolverError) as raised:
+            self.solver.inverse_dynamics(q)
+        self.assertEqual(raised.exception.rows, [3])
+        self.assertIn("row 3", str(raised.exception))
+        forces = self.solver.inverse_dynamics(q, failures_as_nan=True)
+        self.assertEqual(list(np.isnan(forces).all(axis=1)), [k == 3 for k in range(10)])
+
+    def test_wrong_arguments_are_value_errors(self):
+        solver, home = self.solver, self.solver.home
+        nan = home.copy()
+        nan[0] = np.nan
+        for call, says in (
+            (lambda: solver.close(home[:5]), "q has 5 values, not 6"),
+            (lambda: solver.close(nan), r"q\[0\] is not a finite number"),
+            (lambda: solver.close(np.zeros((2, 3, 6))), "3 dimensions"),
+            (lambda: solver.close(np.zeros((2, 5))), "not"),
+            (lambda: solver.inverse_dynamics(np.zeros((2, 6)), np.zeros(6)), "one state"),
+            (lambda: solver.inverse_dynamics(home, loads=[mbverify.Wrench("p")]), "no body 'p'"),
+            (lambda: solver.jacobian(home, "platfrom"), "platform"),
+            (lambda: self.model.solver(["platform.z"]), "degrees of freedom"),
+            (lambda: self.model.solver(self.model.drives + ["platform.z"]), "too many"),
+            (lambda: self.model.solver(["leg"]), "has no coordinate 'leg'"),
+        ):
+            with self.assertRaisesRegex(ValueError, says):
+                call()
+        with self.assertRaises(TypeError):
+            solver.close("home")
+        with self.assertRaises(TypeError):
+            solver.inverse_dynamics(home, loads=[3])
+
+    def test_unreachable_poses_are_exceptions(self):
+        model = mbverify.load("four_bar")
+        solver = model.solver([model.outputs[0] + ".x"])
+        with self.assertRaises(mbverify.UnreachableError):
+            solver.close(solver.home + 100)
+        self.assertEqual(len(solver.close(solver.home).drives), 1)
+
+    def test_a_solver_outlives_its_model(self):
+        solver = mbverify.load("four_bar").solver()
+        gc.collect()
+        forces = solver.inverse_dynamics(solver.home)
+        drives = forces.drives
+        del forces
+        gc.collect()
+        self.assertTrue(np.isfinite(drives).all())
+
+    def test_threads_may_have_solvers_of_their_own(self):
+        expected = self.solver.inverse_dynamics(self.solver.home).drives
+        found, model = [], self.model
+
+        def work():
+            solver = model.solver()
+            rows = np.tile(solver.home, (300, 1))
+            found.append(solver.inverse_dynamics(rows, threads=2)[-1])
+
+        threads = [threading.Thread(target=work) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(len(found), 4)
+        for forces in found:
+            np.testing.assert_allclose(forces, expected, rtol=1e-10)
+
+    def test_ctrl_c_ends_a_batch(self):
+        rows = np.tile(self.solver.home, (2_000_000, 1)) + 1e-3
+        timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+        timer.start()
+        start = time.monotonic()
+        with self.assertRaises(KeyboardInterrupt):
+            self.solver.inverse_dynamics(rows)
+        self.assertLess(time.monotonic() - start, 20)
+
+    def test_memory_stays_flat(self):
+        home = self.solver.home
+
+        def calls():
+            for _ in range(3000):
+                self.solver.inverse_dynamics(home + 1e-4)
+                self.solver.mass_matrix(home)
+
+        calls()
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        for _ in range(4):
+            calls()
+        after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        self.assertLess(after - before, 2048)  # [KiB]
+
+
+class Stubs(unittest.TestCase):
+    def test_declare_what_there_is(self):
+        file = pathlib.Path(mbverify.__file__).parent / "_native.pyi"
+        for item in ast.parse(file.read_text()).body:
+            if not isinstance(item, (ast.ClassDef, ast.FunctionDef)):
+                continue
+            found = getattr(mbverify, item.name)
+            self.assertTrue(found.__doc__, item.name)
+            if not isinstance(item, ast.ClassDef) or issubclass(found, Exception):
+                continue
+            declared = {m.name for m in item.body if isinstance(m, ast.FunctionDef)}
+            there = {name for name in vars(found) if not name.startswith("_")}
+            self.assertEqual(declared - {"__init__"}, there, item.name)
+
+
+class Files(unittest.TestCase):
+    def test_a_model_that_is_none_is_explained(self):
+        with self.assertRaises(mbverify.InputError) as raised:
+            mbverify.load("stewrat")
+        self.assertIn("stewart", raised.exception.findings[0].hint)
+
+    def test_findings_are_data(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "model.yaml"
+            file.write_text("name: x\nbodies: 3\njoints: {}\n")
+            with self.assertRaises(mbverify.InputError) as raised:
+                mbverify.load(str(file))
+        found = raised.exception.findings
+        self.assertEqual(found[0].line, 2)
+        self.assertTrue(found[0].is_error)
+        self.assertIn("error", repr(found[0]))
+
+    def test_hostile_files_end_in_exceptions(self):
+        """Seeds of the fuzzers, whole, cut and with bytes changed."""
+        generator = np.random.default_rng(5)
+        tried = refused = 0
+        with tempfile.TemporaryDirectory() as folder:
+            for seed in sorted((SOURCE / "tests" / "fuzz" / "seeds").rglob("*")):
+                if not seed.is_file() or seed.suffix not in (".xml", ".urdf", ".yaml"):
+                    continue
+                text = seed.read_bytes()
+                changed = bytearray(text)
+                for at in generator.integers(0, max(1, len(text)), 8):
+                    if changed:
+                        changed[at] = generator.integers(0, 256)
+                for content in (text, text[: len(text) // 2], bytes(changed)):
+                    file = pathlib.Path(folder) / ("hostile" + seed.suffix)
+                    file.write_bytes(content)
+                    tried += 1
+                    try:
+                        mbverify.load(str(file))
+                    except mbverify.InputError as error:
+                        refused += 1
+                        self.assertTrue(error.findings)
+        self.assertGreater(tried, 20)
+        self.assertGreater(refused, tried // 3)
+
+
+class Commands(unittest.TestCase):
+    def test_a_run_is_the_programs(self):
+        for name in ("four_bar/static", "stewart/static", "spr_tripod/static"):
+            with self.subTest(name), tempfile.TemporaryDirectory() as folder:
+                subprocess.run(
+                    [mbverify.program(), "run", name, "--no-pictures", "--out", folder + "/a"],
+                    capture_output=True, check=True,
+                )
+                result = mbverify.run(name, out=folder + "/b")
+                self.assertTrue(result.passed)
+                for file in ("traces.csv", "model.xml"):
+                    self.assertEqual(
+                        (pathlib.Path(folder) / "a" / name / file).read_bytes(),
+                        (result.folder / file).read_bytes(),
+                    )
+                written = json.loads((result.folder / "summary.json").read_text())
+                self.assertEqual(written["checks"], result.checks)
+                self.assertLess(result.worst["value"], result.worst["limit"])
+                drive = mbverify.load(name.split("/")[0]).drives[0]
+                self.assertIn(f"{drive}.force.reference", result.traces)
+                self.assertIn("AGREE", result._repr_html_())
+
+    def test_traces_are_a_data_frame(self):
+        if not importlib.util.find_spec("pandas"):
+            self.skipTest("python3-pandas is not installed")
+        result = mbverify.run("four_bar/static")
+        frame = result.to_pandas()
+        self.assertEqual(frame.index.name, "time_s")
+        np.testing.assert_array_equal(
+            frame["motor.force.reference"], result.traces["motor.force.reference"]
+        )
+
+    def test_a_study_is_the_programs(self):
+        study = SOURCE / "scenarios" / "spr_tripod" / "study_one_at_a_time.yaml"
+        result = mbverify.study(study, jobs=2)
+        self.assertEqual(result.summary["points"], 9)
+        self.assertTrue(result.quantities)
+        self.assertTrue((result.folder / "points.csv").is_file())
+        with self.assertRaises(mbverify.InputError):
+            mbverify.study(study, count=-1)
+
+    def test_a_wrong_number_is_a_verdict(self):
+        result = mbverify.run("four_bar/static", set={"simulation.parameters": "{rho: 2.1}"})
+        self.assertEqual(result.verdict, "disagree")
+        self.assertFalse(result.passed)
+        self.assertGreater(result.worst["value"], result.worst["limit"])
+
+    def test_bad_input_is_an_exception(self):
+        with self.assertRaises(mbverify.InputError) as raised:
+            mbverify.run("four_bar/static", set={"motion.duratoin_s": 1})
+        self.assertTrue(raised.exception.findings)
+        self.assertIn("duration_s", str(raised.exception))
+        with self.assertRaises(mbverify.InputError):
+            mbverify.run("no_such/scenario")
+
+    def test_what_cannot_run_is_a_result(self):
+        scenario = SOURCE / "scenarios" / "four_bar" / "must_fail"
+        found = [f for f in sorted(scenario.glob("*.yaml")) if "not_run" in f.read_text()]
+        self.assertTrue(found)
+        self.assertEqual(mbverify.run(found[0]).verdict, "not_run")
+
+    def test_a_results_files_live_as_long_as_it(self):
+        result = mbverify.run("four_bar/static")
+        folder = result.folder
+        self.assertTrue((folder / "report.html").is_file())
+        del result
+        gc.collect()
+        self.assertFalse(folder.exists())
+
+    def test_audit_gives_each_equation(self):
+        document = mbverify.audit("spr_tripod")
+        self.assertEqual(document["schema"].split("/")[0], "mbverify.audit")
+
+    def test_figures_are_files(self):
+        with tempfile.TemporaryDirectory() as folder:
+            files = mbverify.figures("four_bar/static", out=folder, formats=("svg",))
+            self.assertTrue(files)
+            for file in files:
+                self.assertTrue(file.is_file(), file)
+
+    def test_a_program_that_is_killed_is_an_exception(self):
+        with tempfile.TemporaryDirectory() as folder:
+            fake = pathlib.Path(folder) / "mbverify"
+            fake.write_text("#!/bin/sh\nkill -9 $$\n")
+            fake.chmod(0o755)
+            os.environ["MBVERIFY"] = str(fake)
+            try:
+                with self.assertRaises(mbverify.ProgramError) as raised:
+                    mbverify.run("four_bar/static")
+            finally:
+                del os.environ["MBVERIFY"]
+            self.assertIn("signal 9", str(raised.exception))
+
+
+if __name__ == "__main__":
+    unittest.main()
