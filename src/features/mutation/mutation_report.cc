@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/json_document.h"
-#include "base/json_text.h"
+#include "base/json_fields.h"
 #include "base/markup.h"
 #include "base/text.h"
 #include "report/page.h"
@@ -171,152 +170,8 @@ std::string ToText(const MutationReport& report, bool markdown) {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr const char* kMutationSchema = "mbverify.mutate/2";
 constexpr const char* kKinds[] = {"parameter", "instance", "literal"};
-
-// One list of fields per struct serves both directions.
-struct ToFields {
-  Json json = Json::object();
-  void operator()(const char* key, const double& x) { json[key] = Number(x); }
-  template <typename T>
-  void operator()(const char* key, const T& x) {
-    json[key] = x;
-  }
-};
-
-struct FromFields {
-  const JsonValue& json;
-  void operator()(const char* key, double& x) const { x = json.at(key).NumberOrNan(); }
-  template <typename T>
-  void operator()(const char* key, T& x) const {
-    x = json.at(key).get<T>();
-  }
-};
-
-template <typename F, typename S>
-void DetectionFields(F& field, S& s) {
-  field("ran", s.ran);
-  field("detected", s.detected);
-  field("by_force", s.by_force);
-  field("force_nrmse", s.force_change);
-  field("smallest", s.smallest);
-  field("check", s.best_check);
-  field("only", s.only);
-  field("reason", s.reason);
-}
-
-template <typename F, typename S>
-void FaultFields(F& field, S& s) {
-  field("ran", s.ran);
-  field("detected", s.detected);
-  field("check", s.check);
-  field("value", s.value);
-  field("limit", s.limit);
-  field("reason", s.reason);
-}
-
-template <typename F, typename M>
-void MutationFields(F& field, M& m) {
-  field("name", m.name);
-  field("unit", m.unit);
-  field("value", m.value);
-  field("relative_to", m.relative_to);
-  field("unseen_up_to", m.proved_to);
-  field("force_sensitivity", m.sensitivity);
-  field("reason", m.reason);
-}
-
-template <typename F, typename R>
-void ResultFields(F& field, R& r) {
-  field("fault", r.kind);
-  field("where", r.where);
-  field("applicable", r.applicable);
-  field("alike", r.alike);
-  field("reason", r.reason);
-}
-
-template <typename F, typename R>
-void ReportFields(F& field, R& r) {
-  field("scenario", r.scenario);
-  field("mode", r.mode);
-  field("exit_code", r.exit_code);
-  field("size", r.size);
-  field("resolution", r.resolution);
-  field("simulations", r.runs);
-  field("wall_s", r.wall_s);
-}
-
-Json JsonOf(const Detection& s) {
-  ToFields field;
-  DetectionFields(field, s);
-  return field.json;
-}
-
-Json JsonOf(const FaultDetection& s) {
-  ToFields field;
-  FaultFields(field, s);
-  return field.json;
-}
-
-template <typename T>
-Json Optional(const std::optional<T>& value) {
-  return value ? JsonOf(*value) : Json();
-}
-
-Json JsonOf(const Mutation& m) {
-  ToFields field;
-  field("kind", kKinds[static_cast<size_t>(m.kind)]);
-  MutationFields(field, m);
-  field.json["own"] = JsonOf(m.own);
-  field.json["inverse"] = Optional(m.inverse);
-  return field.json;
-}
-
-Json JsonOf(const FaultResult& r) {
-  ToFields field;
-  ResultFields(field, r);
-  field.json["own"] = JsonOf(r.own);
-  field.json["inverse"] = Optional(r.inverse);
-  return field.json;
-}
-
-Detection DetectionOf(const JsonValue& json) {
-  Detection s;
-  const FromFields field{json};
-  DetectionFields(field, s);
-  return s;
-}
-
-FaultDetection FaultDetectionOf(const JsonValue& json) {
-  FaultDetection s;
-  const FromFields field{json};
-  FaultFields(field, s);
-  return s;
-}
-
-Mutation MutationOf(const JsonValue& json) {
-  Mutation m;
-  const FromFields field{json};
-  MutationFields(field, m);
-  const std::string word = json.at("kind");
-  const auto kind = std::find(std::begin(kKinds), std::end(kKinds), word);
-  if (kind == std::end(kKinds)) json.at("kind").Refuse("is not a kind of a number");
-  m.kind = static_cast<NumberKind>(kind - std::begin(kKinds));
-  m.own = DetectionOf(json.at("own"));
-  if (!json.at("inverse").is_null()) m.inverse = DetectionOf(json.at("inverse"));
-  return m;
-}
-
-FaultResult FaultResultOf(const JsonValue& json) {
-  FaultResult r;
-  const FromFields field{json};
-  ResultFields(field, r);
-  r.own = FaultDetectionOf(json.at("own"));
-  if (!json.at("inverse").is_null()) r.inverse = FaultDetectionOf(json.at("inverse"));
-  return r;
-}
 
 // Item k of part i is item k·n + i of all.
 template <typename T>
@@ -337,32 +192,75 @@ std::vector<T> Interleave(std::vector<MutationReport>* parts,
 
 }  // namespace
 
+template <typename F, Is<Detection> T>
+void Describe(F& field, T& detection) {
+  field("ran", detection.ran);
+  field("detected", detection.detected);
+  field("by_force", detection.by_force);
+  field("force_nrmse", detection.force_change);
+  field("smallest", detection.smallest);
+  field("check", detection.best_check);
+  field("only", detection.only);
+  field("reason", detection.reason);
+}
+
+template <typename F, Is<FaultDetection> T>
+void Describe(F& field, T& detection) {
+  field("ran", detection.ran);
+  field("detected", detection.detected);
+  field("check", detection.check);
+  field("value", detection.value);
+  field("limit", detection.limit);
+  field("reason", detection.reason);
+}
+
+template <typename F, Is<Mutation> T>
+void Describe(F& field, T& mutation) {
+  field.Word("kind", mutation.kind, kKinds);
+  field("name", mutation.name);
+  field("unit", mutation.unit);
+  field("value", mutation.value);
+  field("relative_to", mutation.relative_to);
+  field("unseen_up_to", mutation.proved_to);
+  field("force_sensitivity", mutation.sensitivity);
+  field("reason", mutation.reason);
+  field("own", mutation.own);
+  field("inverse", mutation.inverse);
+}
+
+template <typename F, Is<FaultResult> T>
+void Describe(F& field, T& result) {
+  field("fault", result.kind);
+  field("where", result.where);
+  field("applicable", result.applicable);
+  field("alike", result.alike);
+  field("reason", result.reason);
+  field("own", result.own);
+  field("inverse", result.inverse);
+}
+
+template <typename F, Is<MutationReport> T>
+void Describe(F& field, T& report) {
+  field("scenario", report.scenario);
+  field("mode", report.mode);
+  field("exit_code", report.exit_code);
+  field("size", report.size);
+  field("resolution", report.resolution);
+  field("simulations", report.runs);
+  field("wall_s", report.wall_s);
+  field("numbers", report.mutations);
+  field("faults", report.faults);
+}
+
 std::string ToJson(const MutationReport& report) {
-  ToFields field;
-  field("schema", kMutationSchema);
-  ReportFields(field, report);
-  Json& json = field.json;
-  json["numbers"] = Json::array();
-  for (const Mutation& m : report.mutations) json["numbers"].push_back(JsonOf(m));
-  json["faults"] = Json::array();
-  for (const FaultResult& f : report.faults) json["faults"].push_back(JsonOf(f));
-  return Dump(json);
+  JsonFieldWriter field;
+  field("schema", std::string(kMutationSchema));
+  Describe(field, report);
+  return Dump(field.json);
 }
 
 std::optional<MutationReport> MutationReportOf(const std::string& text) {
-  const auto read = [](const JsonValue& json) {
-    MutationReport report;
-    const FromFields field{json};
-    ReportFields(field, report);
-    for (const JsonValue& item : json.at("numbers").list()) {
-      report.mutations.push_back(MutationOf(item));
-    }
-    for (const JsonValue& item : json.at("faults").list()) {
-      report.faults.push_back(FaultResultOf(item));
-    }
-    return report;
-  };
-  return ReadJson(text, read, kMutationSchema).value;
+  return ReadJson(text, FromJson<MutationReport>, kMutationSchema).value;
 }
 
 MutationReport MergeParts(std::vector<MutationReport> parts) {

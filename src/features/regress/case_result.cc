@@ -4,8 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "base/json_document.h"
-#include "base/json_text.h"
+#include "base/json_fields.h"
 
 namespace mbv {
 namespace {
@@ -17,13 +16,6 @@ constexpr std::array<const char*, 8> kStatusWords = {"not_run",   "as_expected",
 }  // namespace
 
 const char* ToText(CaseStatus status) { return kStatusWords[static_cast<size_t>(status)]; }
-
-CaseStatus CaseStatusOf(const std::string& text) {
-  for (size_t i = 0; i < kStatusWords.size(); ++i) {
-    if (text == kStatusWords[i]) return static_cast<CaseStatus>(i);
-  }
-  return CaseStatus::kNotRun;
-}
 
 int ExitCodeOf(CaseStatus status) {
   switch (status) {
@@ -104,194 +96,124 @@ int ExitCodeOf(const RegressReport& report) {
 
 // regress.json and the state files: CaseResult and RegressReport ↔ JSON.
 
-namespace {
-
-using Json = nlohmann::ordered_json;
-
 constexpr const char* kSchema = "mbverify.regress/1";
 
-Json MetricsJson(const CaseResult& result) {
-  Json metrics = Json::object();
-  for (const auto& [name, metric] : result.metrics) {
-    Json json = {{"value", Number(metric.value)}};
-    if (metric.limit) {
-      json["limit"] = *metric.limit;
-      json["pass"] = metric.pass;
-    }
-    if (!metric.channel.empty()) json["channel"] = metric.channel;
-    if (std::isfinite(metric.time_s)) json["time_s"] = metric.time_s;
-    metrics[name] = std::move(json);
-  }
-  return metrics;
+template <typename F, Is<MetricValue> T>
+void Describe(F& field, T& metric) {
+  field("value", metric.value);
+  const bool judged = metric.limit.has_value();
+  field.Optional("limit", metric.limit, judged);
+  field.Optional("pass", metric.pass, judged);
+  field.Optional("channel", metric.channel, !metric.channel.empty());
+  field.Optional("time_s", metric.time_s, std::isfinite(metric.time_s));
 }
 
-Json DriftsJson(const CaseResult& result) {
-  Json drifts = Json::array();
-  for (const Drift& drift : result.drifts) {
-    drifts.push_back({{"metric", drift.metric},
-                      {"text", drift.text},
-                      {"value", Number(drift.value)},
-                      {"baseline", Number(drift.baseline)},
-                      {"since_run", drift.since_run},
-                      {"since", drift.since}});
-  }
-  return drifts;
+template <typename F, Is<Unmeasured> T>
+void Describe(F& field, T& item) {
+  field("what", item.what);
+  field("why", item.why);
 }
 
-Json PastJson(const PastOfFailure& past) {
-  Json values = Json::object();
-  for (const auto& [name, value] : past.values) values[name] = Number(value);
-  return {{"runs", past.runs},
-          {"good_run", past.good_run},
-          {"when", past.when},
-          {"values", std::move(values)}};
+template <typename F, Is<Drift> T>
+void Describe(F& field, T& drift) {
+  field("metric", drift.metric);
+  field("text", drift.text);
+  field("value", drift.value);
+  field("baseline", drift.baseline);
+  field("since_run", drift.since_run);
+  field("since", drift.since);
 }
 
-PastOfFailure PastOf(const JsonValue& json) {
-  PastOfFailure past;
-  past.runs = json.at("runs");
-  past.good_run = json.at("good_run");
-  past.when = json.at("when");
-  for (const auto& [name, value] : json.at("values").items()) {
-    past.values[name] = value.NumberOrNan();
-  }
-  return past;
+template <typename F, Is<PastOfFailure> T>
+void Describe(F& field, T& past) {
+  field("runs", past.runs);
+  field("good_run", past.good_run);
+  field("when", past.when);
+  field("values", past.values);
 }
 
-Json MissingJson(const RegressReport& report) {
-  Json missing = Json::array();
-  for (const MissingCase& item : report.missing) {
-    missing.push_back({{"key", item.key}, {"last_run", item.last_run}, {"when", item.when}});
-  }
-  return missing;
+template <typename F, Is<Expectation> T>
+void Describe(F& field, T& expected) {
+  field("verdict", expected.verdict);
+  field("exit_code", expected.exit_code);
+  field("mentions", expected.mentions);
 }
 
-Json CaseJson(const CaseResult& result) {
-  Json json = {{"key", result.key},
-               {"file", result.file},
-               {"description", result.description},
-               {"inputs", result.inputs},
-               {"fingerprint", result.fingerprint},
-               {"status", ToText(result.status)},
-               {"reason", result.reason},
-               {"verdict", result.verdict},
-               {"exit_code", result.exit_code},
-               {"signal", result.signal},
-               {"expected",
-                {{"verdict", result.expected.verdict},
-                 {"exit_code", result.expected.exit_code},
-                 {"mentions", result.expected.mentions}}},
-               {"ran", result.ran},
-               {"compared", result.compared},
-               {"verified", result.verified},
-               {"metrics", MetricsJson(result)}};
-  json["not_compared"] = Json::array();
-  for (const Unmeasured& item : result.not_compared) {
-    json["not_compared"].push_back({{"what", item.what}, {"why", item.why}});
-  }
-  json["caveats"] = result.caveats;
-  json["versions"] = result.versions;
-  json["input_files"] = Json::array();
-  for (const InputFile& input : result.input_files) {
-    json["input_files"].push_back({{"file", input.file}, {"fingerprint", input.fingerprint}});
-  }
-  json["has_folder"] = result.has_folder;
-  json["has_report"] = result.has_report;
-  json["cost"] = {{"wall_s", result.cost.wall_s},
-                  {"cpu_s", result.cost.cpu_s},
-                  {"peak_kib", result.cost.peak_kib}};
-  json["log_tail"] = result.log_tail;
-  json["kept"] = result.kept;
-  json["drifts"] = DriftsJson(result);
-  if (result.past.runs > 0) json["past"] = PastJson(result.past);
-  if (!result.changes.empty()) json["changes"] = result.changes;
-  json["course"] = Json::array();
-  for (double value : result.course) json["course"].push_back(Number(value));
-  return json;
+template <typename F, Is<InputFile> T>
+void Describe(F& field, T& input) {
+  field("file", input.file);
+  field("fingerprint", input.fingerprint);
 }
 
-CaseResult CaseOf(const JsonValue& json) {
-  CaseResult result;
-  result.key = json.at("key");
-  result.file = json.at("file");
-  result.description = json.at("description");
-  result.inputs = json.at("inputs");
-  result.fingerprint = json.at("fingerprint");
-  result.status = CaseStatusOf(json.at("status"));
-  result.reason = json.at("reason");
-  result.verdict = json.at("verdict");
-  result.exit_code = json.at("exit_code");
-  result.signal = json.at("signal");
-  result.expected.verdict = json.at("expected").at("verdict");
-  result.expected.exit_code = json.at("expected").at("exit_code");
-  result.expected.mentions = json.at("expected").at("mentions");
-  result.ran = json.at("ran");
-  result.compared = json.at("compared");
-  result.verified = json.at("verified");
-  for (const auto& [name, metric] : json.at("metrics").items()) {
-    MetricValue& value = result.metrics[name];
-    value.value = metric.at("value").NumberOrNan();
-    value.channel = metric.value("channel", "");
-    value.time_s = metric.contains("time_s") ? metric.at("time_s").NumberOrNan() : kNan;
-    if (!metric.contains("limit")) continue;
-    value.limit = metric.at("limit").get<double>();
-    value.pass = metric.at("pass");
-  }
-  for (const JsonValue& item : json.at("not_compared").list()) {
-    result.not_compared.push_back({item.at("what"), item.at("why")});
-  }
-  if (json.contains("caveats")) {
-    result.caveats = json.at("caveats").get<std::vector<std::string>>();
-  }
-  result.versions = json.at("versions").get<std::map<std::string, std::string>>();
-  if (json.contains("input_files")) {
-    for (const JsonValue& input : json.at("input_files").list()) {
-      result.input_files.push_back({input.at("file"), input.at("fingerprint")});
-    }
-  }
-  result.has_folder = json.at("has_folder");
-  result.has_report = json.value("has_report", result.has_folder);
-  result.cost.wall_s = json.at("cost").at("wall_s");
-  result.cost.cpu_s = json.at("cost").at("cpu_s");
-  result.cost.peak_kib = json.at("cost").at("peak_kib");
-  result.log_tail = json.at("log_tail");
-  result.kept = json.at("kept");
-  for (const JsonValue& drift : json.at("drifts").list()) {
-    result.drifts.push_back({drift.at("metric"), drift.at("text"), drift.at("value").NumberOrNan(),
-                             drift.at("baseline").NumberOrNan(), drift.at("since_run"),
-                             drift.at("since")});
-  }
-  if (json.contains("past")) result.past = PastOf(json.at("past"));
-  if (json.contains("changes")) {
-    result.changes = json.at("changes").get<std::vector<std::string>>();
-  }
-  for (const JsonValue& value : json.at("course").list()) {
-    result.course.push_back(value.NumberOrNan());
-  }
-  return result;
+template <typename F, Is<Cost> T>
+void Describe(F& field, T& cost) {
+  field("wall_s", cost.wall_s);
+  field("cpu_s", cost.cpu_s);
+  field("peak_kib", cost.peak_kib);
 }
 
-}  // namespace
+template <typename F, Is<MissingCase> T>
+void Describe(F& field, T& missing) {
+  field("key", missing.key);
+  field("last_run", missing.last_run);
+  field("when", missing.when);
+}
 
-std::string ToJson(const CaseResult& result) { return Dump(CaseJson(result), 1); }
+template <typename F, Is<CaseResult> T>
+void Describe(F& field, T& result) {
+  field("key", result.key);
+  field("file", result.file);
+  field("description", result.description);
+  field("inputs", result.inputs);
+  field("fingerprint", result.fingerprint);
+  field.Word("status", result.status, kStatusWords);
+  field("reason", result.reason);
+  field("verdict", result.verdict);
+  field("exit_code", result.exit_code);
+  field("signal", result.signal);
+  field("expected", result.expected);
+  field("ran", result.ran);
+  field("compared", result.compared);
+  field("verified", result.verified);
+  field("metrics", result.metrics);
+  field("not_compared", result.not_compared);
+  field.Optional("caveats", result.caveats);
+  field("versions", result.versions);
+  field.Optional("input_files", result.input_files);
+  field("has_folder", result.has_folder);
+  field.Optional("has_report", result.has_report);
+  field("cost", result.cost);
+  field("log_tail", result.log_tail);
+  field("kept", result.kept);
+  field("drifts", result.drifts);
+  field.Optional("past", result.past, result.past.runs > 0);
+  field.Optional("changes", result.changes, !result.changes.empty());
+  field("course", result.course);
+}
+
+template <typename F, Is<RunInfo> T>
+void Describe(F& field, T& run) {
+  field.Optional("uid", run.uid);
+  field("id", run.id);
+  field("started_utc", run.started_utc);
+  field("finished_utc", run.finished_utc);
+  field("label", run.label);
+  field("host", run.host);
+  field("program", run.program);
+  field("shard", run.shard);
+  field.Optional("covers", run.covers);
+  field.Optional("found", run.found);
+  field.Optional("partial", run.partial);
+  field("wall_s", run.wall_s);
+  field("jobs", run.jobs);
+}
+
+std::string ToJson(const CaseResult& result) { return Dump(JsonOf(result), 1); }
 
 std::string ToJson(const RegressReport& report) {
   const Counts counts = CountCases(report);
-  Json json = {{"schema", kSchema},
-               {"run",
-                {{"uid", report.run.uid},
-                 {"id", report.run.id},
-                 {"started_utc", report.run.started_utc},
-                 {"finished_utc", report.run.finished_utc},
-                 {"label", report.run.label},
-                 {"host", report.run.host},
-                 {"program", report.run.program},
-                 {"shard", report.run.shard},
-                 {"covers", report.run.covers},
-                 {"found", report.run.found},
-                 {"partial", report.run.partial},
-                 {"wall_s", report.run.wall_s},
-                 {"jobs", report.run.jobs}}},
+  return Dump({{"schema", kSchema},
+               {"run", JsonOf(report.run)},
                {"exit_code", ExitCodeOf(report)},
                {"counts",
                 {{"total", counts.total},
@@ -304,43 +226,25 @@ std::string ToJson(const RegressReport& report) {
                  {"missing", counts.missing}}},
                {"notes", report.notes},
                {"fail_on_missing", report.fail_on_missing},
-               {"missing", MissingJson(report)},
-               {"cases", Json::array()}};
-  for (const CaseResult& result : report.cases) json["cases"].push_back(CaseJson(result));
-  return Dump(json, 1);
+               {"missing", JsonOf(report.missing)},
+               {"cases", JsonOf(report.cases)}},
+              1);
 }
 
 std::optional<CaseResult> CaseFromJson(const std::string& text) {
-  return ReadJson(text, CaseOf).value;
+  return ReadJson(text, FromJson<CaseResult>).value;
 }
 
 std::optional<RegressReport> ReportFromJson(const std::string& text, const std::string& file,
                                             std::optional<Finding>* damage) {
   const auto read = [](const JsonValue& json) {
-    RegressReport report;
-    const JsonValue run = json.at("run");
-    report.run.uid = run.value("uid", "");
-    report.run.id = run.at("id");
-    report.run.started_utc = run.at("started_utc");
-    report.run.finished_utc = run.at("finished_utc");
-    report.run.label = run.at("label");
-    report.run.host = run.at("host");
-    report.run.program = run.at("program");
-    report.run.shard = run.at("shard");
-    report.run.covers = run.value("covers", std::vector<std::string>{});
-    report.run.found = run.value("found", size_t{0});
-    report.run.partial = run.value("partial", false);
-    report.run.wall_s = run.at("wall_s");
-    report.run.jobs = run.at("jobs");
-    report.notes = json.at("notes").get<std::vector<std::string>>();
-    report.fail_on_missing = json.value("fail_on_missing", false);
-    if (json.contains("missing")) {
-      for (const JsonValue& item : json.at("missing").list()) {
-        report.missing.push_back({item.at("key"), item.at("last_run"), item.at("when")});
-      }
-    }
-    for (const JsonValue& item : json.at("cases").list()) report.cases.push_back(CaseOf(item));
-    return report;
+    return RegressReport{.run = FromJson<RunInfo>(json.at("run")),
+                         .cases = FromJson<std::vector<CaseResult>>(json.at("cases")),
+                         .notes = json.at("notes"),
+                         .missing = json.contains("missing")
+                                        ? FromJson<std::vector<MissingCase>>(json.at("missing"))
+                                        : std::vector<MissingCase>(),
+                         .fail_on_missing = json.value("fail_on_missing", false)};
   };
   auto report = ReadJson(text, read, kSchema);
   if (!report && damage != nullptr) *damage = report.refusal.FindingIn(file);

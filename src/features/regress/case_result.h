@@ -28,7 +28,6 @@ enum class CaseStatus {
   kInternalError,  ///< exit code 4 or one that mbverify does not have
 };
 [[nodiscard]] const char* ToText(CaseStatus status);  ///< "as_expected", "timed_out", …
-[[nodiscard]] CaseStatus CaseStatusOf(const std::string& text);  ///< kNotRun for unknown words
 /// Exit code a status asks for: 0 as expected, 1 unexpected, 2 bad input, 3 everything else.
 [[nodiscard]] int ExitCodeOf(CaseStatus status);
 
