@@ -9,6 +9,7 @@ import pathlib
 import resource
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -339,6 +340,36 @@ class Commands(unittest.TestCase):
             finally:
                 del os.environ["MBVERIFY"]
             self.assertIn("signal 9", str(raised.exception))
+
+
+class Wheel(unittest.TestCase):
+    def test_brings_program_and_models(self):
+        """Installed elsewhere it runs its own program on its own models."""
+        if not importlib.util.find_spec("pip"):
+            self.skipTest("python3-pip is not installed")
+        build = pathlib.Path(mbverify.__file__).parents[2]
+        wheel = subprocess.run(
+            [sys.executable, SOURCE / "scripts" / "wheel", build],
+            capture_output=True, text=True, check=True,
+        ).stdout.strip()
+        asks = (
+            "import mbverify, os; print(mbverify.program()); print(os.path.abspath(mbverify.load('stewart').file));"
+            "print(mbverify.run('four_bar/static').verdict)"
+        )
+        with tempfile.TemporaryDirectory() as prefix:
+            subprocess.run(
+                [sys.executable, "-m", "pip", "install", "-q", "--no-index", "--no-deps",
+                 "--break-system-packages", "--prefix", prefix, wheel],
+                capture_output=True, check=True,
+            )
+            site = next(pathlib.Path(prefix).rglob("mbverify/_program.py")).parents[1]
+            said = subprocess.run(
+                [sys.executable, "-c", asks], env={"PYTHONPATH": str(site), "PATH": "/usr/bin:/bin"},
+                cwd="/", capture_output=True, text=True, check=True,
+            ).stdout.splitlines()
+            self.assertTrue(said[0].startswith(prefix), said)
+            self.assertTrue(said[1].startswith(prefix), said)
+            self.assertEqual(said[2], "agree")
 
 
 if __name__ == "__main__":
