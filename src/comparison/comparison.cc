@@ -407,7 +407,9 @@ std::string internal::WhyNotCompared(const Witness& measured, const Witness& tru
   std::string why;
   for (const Witness* witness : {&measured, &truth}) {
     if (witness->ran()) continue;
-    why += (why.empty() ? "" : "; ") + Explain(*witness);
+    // What went wrong is said where the witness is.
+    const bool failed = witness->stiffness == nullptr && witness->summary.stop != Stop::kNotRun;
+    why += (why.empty() ? "" : "; ") + (failed ? witness->name + " failed" : Explain(*witness));
   }
   return why;
 }

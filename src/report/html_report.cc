@@ -278,7 +278,7 @@ class PageWriter {
       page_.Add(SourceModelSection(*report_.source_model, false));
     }
     page_.Add("Energy", "Energy", EnergyHtml(report_));
-    page_.Add("What could not be compared", "Gaps", GapsHtml(view_));
+    page_.Add("What could not be compared", "Gaps", GapsHtml(view_, true));
     page_.Add("The paper's equations", "Equations", AuditHtml(input_.audit));
     page_.Add("How to read the force signals", "Signals", SignalsHtml(report_));
     page_.Add("Parameters", "Parameters", ParametersHtml(input_.mechanism->parameters, true));
@@ -351,11 +351,10 @@ class PageWriter {
   }
 
   std::string CountCards() const {
-    return Card("Ran · compared · verified",
-                fmt::format("{} · {} · {}", view_.ran(), view_.pairs_compared, view_.verified),
-                fmt::format("witnesses of {} · pairs of {} · checks of {}",
-                            std::max<size_t>(3, view_.witnesses.size()),
-                            std::max<size_t>(3, view_.pairs), view_.limits()));
+    return Card("Checks that verify", fmt::format("{} of {}", view_.verified, view_.limits()),
+                fmt::format("{} of {} witnesses ran, {} of {} pairs were compared", view_.ran(),
+                            std::max<size_t>(3, view_.witnesses.size()), view_.pairs_compared,
+                            std::max<size_t>(3, view_.pairs)));
   }
 
   // Filled by the script; without it, plots that do not move.

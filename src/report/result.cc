@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/json_text.h"
 #include "comparison/verdict.h"
@@ -352,15 +353,15 @@ PageHead HeadOf(const ResultView& view) {
 std::string VerdictHtml(const ResultView& view, const std::string& cards,
                         const std::string& about) {
   const auto sentence = [](const std::string& text) { return Escape(Sentence(text)); };
-  std::string html = "<p class=\"reason\">" + sentence(view.reason) + "</p>\n";
+  // Who agrees with whom is the verdict in plain words; how many checks say so comes after it.
+  const std::string& who = view.attribution.text;
+  std::string html = fmt::format("<p class=\"reason{}\">{}</p>\n",
+                                 view.attribution.odd_one_out.empty() ? "" : " odd",
+                                 sentence(who.empty() ? view.reason : who));
+  if (!who.empty()) html += "<p class=\"attribution\">" + sentence(view.reason) + "</p>\n";
   for (const Caveat& caveat : view.caveats) {
     html +=
-        "<p class=\"reason\">" + Pill("warn", "caveat") + " " + sentence(caveat.text) + "</p>\n";
-  }
-  if (!view.attribution.text.empty()) {
-    html += fmt::format("<p class=\"attribution{}\">{}</p>\n",
-                        view.attribution.odd_one_out.empty() ? "" : " odd",
-                        sentence(view.attribution.text));
+        "<p class=\"caveat\">" + Pill("warn", "caveat") + " " + sentence(caveat.text) + "</p>\n";
   }
   html += "<dl class=\"cards\">\n" + cards + "</dl>\n" + Note(about);
   if (view.frame->findings.empty()) return html;
@@ -384,10 +385,12 @@ std::string ChecksHtml(const ResultView& view, const std::string& note) {
   return ToHtml(table) + Note(note);
 }
 
-std::string GapsHtml(const ResultView& view) {
+std::string GapsHtml(const ResultView& view, bool reason_tells_failure) {
   std::string html;
+  bool said = !reason_tells_failure || view.verdict != Verdict::kNotRun;
   for (const auto& [name, summary] : view.witnesses) {
     if (summary.ok()) continue;
+    if (summary.stop != Stop::kNotRun && !std::exchange(said, true)) continue;
     html += "<li><b>" + Escape(name) + "</b>: " + Escape(ToText(summary.stop)) + ". " +
             Escape(summary.message) + "</li>\n";
   }

@@ -70,6 +70,9 @@ test('Values have four digits, a prefix where it reads better, and a true minus'
   assert.equal(formatValue(1e-5, 'm'), '1.00e−5 m');
   assert.equal(formatValue(0, 'm'), '0.000 m');
   assert.equal(formatValue(0.5), '0.5000');
+  assert.equal(formatValue(-2.3e-16, 'm', 0.4), '0 m', 'round-off beside the largest');
+  assert.equal(formatValue(5e-13, 'm', 0.4), '5.00e−13 m');
+  assert.equal(formatValue(2.3e-16, 'm', 3e-16), '2.30e−16 m');
   assert.equal(formatValue(NaN, 'N'), '–');
 });
 

@@ -63,12 +63,12 @@ test('Errors are of the simulation against the closed form where both ran', () =
   assert.equal(errorPair(page({pairs})).measured, 'reference');
 });
 
-test('The worst samples are in order of time, each once', () => {
-  const worst = (time, drive) => ({worst: {drive, time, value: 1e-9}});
-  const pairs = [pair('a', 'b', worst(0.5, 1)), pair('c', 'd', worst(0, 0)), pair('e', 'f', worst(0.5, 0)),
-                 pair('g', 'h', worst(null, 0)), pair('i', 'j')];
-  assert.deepEqual(worstSamples(page({pairs})), [{time: 0, label: 'c against d: slide'},
-                                                 {time: 0.5, label: 'a against b: turn'}]);
+test('The worst samples begin with the worst, each once', () => {
+  const worst = (time, drive, value) => ({worst: {drive, time, value}});
+  const pairs = [pair('a', 'b', worst(0, 1, 1e-9)), pair('c', 'd', worst(0.5, 0, 3e-9)), pair('e', 'f', worst(0, 0, 1e-10)),
+                 pair('g', 'h', worst(null, 0, 1)), pair('i', 'j')];
+  assert.deepEqual(worstSamples(page({pairs})), [{time: 0.5, value: 3e-9, label: 'c against d: slide'},
+                                                 {time: 0, value: 1e-9, label: 'a against b: turn'}]);
 });
 
 test('Forces, errors, positions and outputs have a panel each, by unit', () => {

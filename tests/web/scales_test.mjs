@@ -30,6 +30,22 @@ test('All labels of an axis have one prefix', () => {
   assert.deepEqual(axisLabels([-1e-5, 0]), ['−1e−5', '0']);
 });
 
+test('A label says the value of its mark', () => {
+  const scales = {'': 1, k: 1e3, M: 1e6};
+  const valueOf = (label) => {
+    const [digits, prefix = ''] = label.replaceAll('−', '-').split(' ');
+    return Number(digits) * scales[prefix];
+  };
+  for (let exponent = -14; exponent <= 9; ++exponent) {
+    for (const step of [1, 2, 2.5, 5]) {
+      const marks = [-3, -1, 0, 1, 2, 3, 7].map((k) => k * step * 10 ** exponent);
+      axisLabels(marks).forEach((label, i) => {
+        assert.ok(Math.abs(valueOf(label) - marks[i]) <= 1e-6 * Math.abs(marks[i]), `${label} at ${marks[i]}`);
+      });
+    }
+  }
+});
+
 test('A range has room above and below, and a constant signal is not blown up', () => {
   const [low, high] = padded(-1, 3);
   assert.ok(low < -1 && high > 3 && high - low < 5);

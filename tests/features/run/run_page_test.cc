@@ -28,6 +28,22 @@ std::string EquationsSection(const fs::path& out, const std::string& kept) {
   return page.substr(begin, page.find("</section>", begin) - begin);
 }
 
+TEST(RunPage, WhatStoppedARunIsSaidOnce) {
+  const fs::path out = fs::temp_directory_path() / ("mbv_run_page_" + std::to_string(getpid()));
+  RunOptions options;
+  options.pictures = false;
+  options.out_dir = out.string();
+  const RunOutcome outcome =
+      RunScenario(SourcePath("/scenarios/four_bar/must_fail/out_of_reach.yaml"), options);
+  const std::string page = ReadWholeFile(fs::path(outcome.folder) / "report.html").value_or("");
+  const std::string why = "the commanded pose cannot be reached";
+  const size_t said = page.find(why);
+  ASSERT_NE(said, std::string::npos);
+  EXPECT_EQ(page.find(why, said + 1), std::string::npos);
+  EXPECT_NE(page.find("reference failed"), std::string::npos);
+  fs::remove_all(out);
+}
+
 TEST(RunPage, TheAuditOfARegressionIsComputedOnceAndReadByTheOthers) {
   const fs::path out = fs::temp_directory_path() / ("mbv_run_page_" + std::to_string(getpid()));
   const fs::path kept = out / "kept", file = kept / "spr_tripod.json";

@@ -95,14 +95,14 @@ export function errorPair({pairs}) {
 }
 
 /**
- * Times of the largest errors, ascending, each once, with what was worst there.
+ * Times of the largest errors, the largest first, each once, with what was worst there.
  * @param {PageData} data
  */
 export function worstSamples({pairs, drives}) {
   return pairs.flatMap(({measured, truth, worst}) => worst && Number.isFinite(worst.time)
-                           ? [{time: worst.time,
+                           ? [{time: worst.time, value: worst.value,
                                label: `${measured} against ${truth}: ${drives[worst.drive].name}`}]
                            : [])
-      .sort((a, b) => a.time - b.time)
-      .filter((worst, i, all) => i === 0 || worst.time > all[i - 1].time);
+      .sort((a, b) => b.value - a.value)
+      .filter((worst, i, all) => all.findIndex(({time}) => time === worst.time) === i);
 }

@@ -92,13 +92,18 @@ export function formatError(value) {
   return value === 0 ? '0' : value.toExponential(1);
 }
 
+/** Of the largest value around: what is smaller is round-off, and shown as 0. */
+export const kResolution = 1e-12;
+
 /**
  * Four significant digits with k, M where it reads better.
  * @param {number} value
  * @param {string} unit
+ * @param {number} largest of the values around, for round-off
  */
-export function formatValue(value, unit = '') {
+export function formatValue(value, unit = '', largest = 0) {
   if (!Number.isFinite(value)) return '–';
+  if (Math.abs(value) < kResolution * largest) return `0 ${unit}`.trim();
   const prefixed = ['N', 'W', 'N m', 'J'].includes(unit);
   const size = Math.abs(value);
   let text, prefix = '';

@@ -4,7 +4,7 @@ import 'uplot/dist/uPlot.min.css';
 
 import {byId, element, isDark} from './dom.js';
 import {decadeMarks, decades} from './log_axis.js';
-import {formatError, formatValue, nearest} from './numbers.js';
+import {formatError, formatValue, kResolution, nearest} from './numbers.js';
 import {groupBy, makePanels, nameOf, withBands} from './panels.js';
 import {axisLabels, largest, padded, plottable, powerOfTen, spread, zoomed} from './scales.js';
 
@@ -16,7 +16,7 @@ import {axisLabels, largest, padded, plottable, powerOfTen, spread, zoomed} from
  *
  * A panel on the page; no plot where every value is zero on a logarithmic axis.
  * @typedef {{panel: Panel, legend: HTMLElement, box: HTMLElement, plot?: uPlot, head?: HTMLElement,
- *            readouts: {key: string, line: Line, readout: HTMLElement, chip: HTMLElement}[]}} PlotView
+ *            largest: number, readouts: {key: string, line: Line, readout: HTMLElement, chip: HTMLElement}[]}} PlotView
  */
 
 const kPaperWidth = 640;  // [px], what A4 leaves between its margins
@@ -29,7 +29,7 @@ const kFont = 'system-ui, sans-serif';
 const kStyles = {
   solid: {width: 1.6},
   solver: {width: 1.6},
-  reached: {width: 1.6},
+  reached: {width: 1.6, dash: [8, 5]},
   analytic: {width: 4.5, alpha: 0.38},
   reference: {width: 1.3, spans: true},  // a table may have fewer rows than there are samples
   simulated: {width: 0, marks: true},
@@ -158,7 +158,8 @@ export class Plots {
       const style = witness.name in kStyles ? witness.name : 'foreign';
       key.append(element('span', {class: `style ${style}`}, element('i'), witness.name));
     }
-    bar.append(key, element('span', {class: 'faint wide'}, 'drag to zoom, click to set the time'));
+    bar.append(key, element('span', {class: 'faint wide'}, 'drag to zoom, click to set the time; ' +
+                               `0: below ${kResolution} of the plot's largest`));
     return bar;
   }
 
@@ -171,7 +172,7 @@ export class Plots {
     const box = element('div', {class: 'plot'});
     this.grid.append(element('figure', {class: 'panel'}, caption, legend, box));
     /** @type {PlotView} */
-    const view = {panel, legend, box, readouts: []};
+    const view = {panel, legend, box, largest: largest(panel.lines, this.data.time)?.value ?? 0, readouts: []};
     const range = panel.log ? decades(panel.lines, panel.limit) : null;
     this.addLegend(view);
     if (panel.log && !range) {
@@ -362,7 +363,8 @@ export class Plots {
     for (const view of this.views) {
       for (const {line, readout} of view.readouts) {
         const value = line.values[at];
-        readout.textContent = view.panel.log ? formatError(value) : formatValue(value, view.panel.unit);
+        readout.textContent = view.panel.log ? formatError(value)
+                                             : formatValue(value, view.panel.unit, view.largest);
       }
     }
   }

@@ -43,7 +43,8 @@ export function axisLabels(marks) {
   const small = largest > 0 && largest < 1e-3;
   return marks.map((mark) => {
     if (mark === null) return '';
-    const text = mark === 0 ? '0' : small ? mark.toExponential(0) : String(Number((mark * scale).toPrecision(6)));
+    const text = mark === 0 ? '0' : small ? Number(mark.toPrecision(6)).toExponential() :
+                                            String(Number((mark * scale).toPrecision(6)));
     return text.replaceAll('-', '−') + (small ? '' : suffix);
   });
 }

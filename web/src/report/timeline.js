@@ -9,7 +9,7 @@ const kLongestFrame = 0.25;  // [s]; a page that was hidden does not jump
 export class Timeline {
   /**
    * @param {{start: number, end: number, sample: number, worst: Worst[]}} run start and end [s];
-   *     sample: step of the arrow keys [s]
+   *     sample: step of the arrow keys [s]; worst: the worst first
    */
   constructor({start, end, sample, worst}) {
     this.start = start;
@@ -66,10 +66,11 @@ export class Timeline {
     this.set(this.start + (Math.round((this.time - this.start) / this.sample) + samples) * this.sample);
   }
 
+  /** To the worst sample; from there to the next worst, and round again. */
   nextWorst() {
     if (this.worst.length === 0) return;
     this.play(false);
-    const after = this.worst.find((worst) => worst.time > this.time + 1e-9);
-    this.set((after ?? this.worst[0]).time);
+    const at = this.worst.findIndex((worst) => Math.abs(worst.time - this.time) < 1e-9);
+    this.set(this.worst[(at + 1) % this.worst.length].time);
   }
 }

@@ -64,7 +64,7 @@ export function timelineBar(timeline) {
 
 const kKeys = [
   ['Space', 'play, pause'], ['← →', 'one sample back, forth (Shift: ten)'], ['Home End', 'start, end'],
-  ['W', 'next worst sample'], ['+ −', 'zoom the plots in, out'], ['0', 'whole time span'],
+  ['W', 'the worst sample; again: the next worst'], ['+ −', 'zoom the plots in, out'], ['0', 'whole time span'],
   ['T', 'colour scheme'], ['?', 'this list'],
   ['in the replay', 'arrows turn, + − zoom, R resets the view'],
 ];

@@ -3,6 +3,7 @@ import {PerspectiveCamera} from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 
 const kFieldOfView = 26;  // [deg]
+const kLowest = 89;       // from the vertical [deg]
 /** @type {Record<string, [number, number]>} */
 const kTurns = {ArrowLeft: [-6, 0], ArrowRight: [6, 0], ArrowUp: [0, 6], ArrowDown: [0, -6]};  // [deg]
 
@@ -21,7 +22,8 @@ export class View {
     this.camera = new PerspectiveCamera(kFieldOfView, 1, 0.01 * radius, 400 * radius);
     this.camera.up.copy(up);
     this.controls = new OrbitControls(this.camera, canvas);
-    Object.assign(this.controls, {minDistance: 0.1 * radius, maxDistance: 30 * radius});
+    Object.assign(this.controls, {minDistance: 0.1 * radius, maxDistance: 30 * radius,
+                                  maxPolarAngle: kLowest * Math.PI / 180});  // above the ground
     this.controls.addEventListener('change', onChange);
     // The wheel scrolls the page until the replay is in use.
     this.controls.enableZoom = false;
@@ -79,7 +81,7 @@ export class View {
     const offset = this.camera.position.clone().sub(this.controls.target);
     offset.applyAxisAngle(this.up, azimuth * Math.PI / 180);
     const angle = offset.angleTo(this.up) * 180 / Math.PI;
-    const wanted = Math.min(175, Math.max(5, angle - elevation));
+    const wanted = Math.min(kLowest, Math.max(5, angle - elevation));
     const side = this.up.clone().cross(offset).normalize();
     offset.applyAxisAngle(side, (wanted - angle) * Math.PI / 180);
     this.camera.position.copy(this.controls.target).add(offset);
