@@ -23,7 +23,8 @@ add_custom_target(web_packages DEPENDS ${web_build}/packages.stamp)
 
 # The page of web/src/<page> as <output>, a source of mbv_<layer>.
 function(mbv_page page output layer)
-  file(GLOB sources CONFIGURE_DEPENDS ${web}/src/${page}/*.js ${web}/src/${page}/*.css)
+  file(GLOB sources CONFIGURE_DEPENDS ${web}/src/${page}/*.js ${web}/src/${page}/*.css
+       ${web}/src/${page}/*.html)
   add_custom_command(
     OUTPUT ${web_build}/${output}
     COMMAND ${CMAKE_COMMAND} -E env NODE_PATH=${web_build}/node_modules

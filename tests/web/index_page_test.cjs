@@ -22,7 +22,7 @@ before(async () => {
 
 after(() => browser?.close());
 
-const names = () => page.$$eval('tbody tr:not([hidden]) th', (cells) => cells.map(
+const names = () => page.$$eval('tr.case th', (cells) => cells.map(
     (cell) => cell.firstChild.textContent));
 // A step through the history ends a little after the call that asks for it.
 async function becomes(read, wanted) {
@@ -31,7 +31,7 @@ async function becomes(read, wanted) {
   assert.deepEqual(await read(), wanted);
 }
 const sortBy = (name) => page.click(`thead button:text-is("${name}")`);
-const numbers = (column) => page.$$eval('tbody tr', (rows, i) => rows.map((row) => row.cells[i].dataset.sort)
+const numbers = (column) => page.$$eval('tr.case', (rows, i) => rows.map((row) => row.cells[i].dataset.sort)
     .filter((text) => text !== '').map(Number), column);
 
 test('One row per scenario, without errors and without any request', async () => {
@@ -43,13 +43,14 @@ test('One row per scenario, without errors and without any request', async () =>
 });
 
 test('Words find scenarios by name and by text, all of them must occur', async () => {
-  const texts = (rows) => page.$$eval(`tbody tr${rows}`, (all) => all.map((row) => row.textContent.toLowerCase()));
+  const texts = () => page.$$eval('tr.case', (all) => all.map((row) => row.textContent.toLowerCase()));
+  const all = await texts();
   for (const words of [['tripod'], ['tripod', 'must_fail']]) {
     await page.fill('#find', words.join(' ').toUpperCase());
     const has = (text) => words.every((word) => text.includes(word));
-    const shown = await texts(':not([hidden])'), hidden = await texts('[hidden]');
+    const shown = await texts();
     assert.ok(shown.length > 0 && shown.every(has), shown.join());
-    assert.ok(hidden.length > 0 && !hidden.some(has), hidden.join());
+    assert.equal(shown.length, all.filter(has).length);
     assert.equal(await page.textContent('#shown'), `${shown.length} of 6 scenarios`);
   }
   assert.ok((await names()).includes('spr_tripod/must_fail/simulated_com'));
@@ -63,7 +64,7 @@ test('What failed can be shown alone, with its reason', async () => {
   await page.selectOption('#kind', 'bad');
   const bad = await names();
   assert.deepEqual(bad.map((name) => name.split('/').at(-1)), ['tight', 'wrong_expectation']);
-  assert.match(await page.innerText('tbody tr:not([hidden]):nth-of-type(2)'), /exit code 0, expected 1/);
+  assert.match(await page.innerText('tr.case >> nth=1'), /exit code 0, expected 1/);
   await page.selectOption('#kind', 'good');
   assert.equal((await names()).length, 4);
   await page.selectOption('#kind', '');
@@ -84,19 +85,41 @@ test('What went wrong stands above the table: check, value, limit, place, and wh
 });
 
 test('The worst comes first, and links of the box lead to its row', async () => {
-  const kinds = () => page.$$eval('tbody tr', (rows) => rows.map((row) => row.dataset.kind));
-  assert.deepEqual(await kinds(), ['bad', 'bad', 'good', 'good', 'good', 'good']);
+  const groups = await page.$$eval('tbody', (all) => all.map((group) => ({
+    text: group.querySelector('.group').textContent,
+    kinds: [...group.querySelectorAll('.case')].map((row) => row.dataset.kind)})));
+  const order = ['bad', 'warn', 'good'];
+  const places = (kinds) => kinds.map((kind) => order.indexOf(kind));
+  for (const {kinds, text} of groups) {
+    assert.deepEqual(places(kinds), places(kinds).sort());
+    assert.match(text, new RegExp(`${kinds.length} scenarios?: `));
+  }
+  const first = places(groups.map(({kinds}) => kinds[0]));
+  assert.equal(first[0], 0);
+  assert.deepEqual(first, [...first].sort());
   assert.equal(await page.getAttribute('thead th[data-key=result]', 'aria-sort'), 'ascending');
   await page.selectOption('#kind', 'good');
   const href = await page.getAttribute('.box.bad a', 'href');
   await page.click('.box.bad a');
   await becomes(() => page.evaluate(() => decodeURIComponent(location.hash)), href);
   // A hidden row is shown again.
-  await becomes(() => page.$$eval(':target', (rows) => rows.map((row) => {
+  await becomes(() => page.$$eval('.target', (rows) => rows.map((row) => {
     const {top, bottom} = row.getBoundingClientRect();
-    return !row.hidden && top >= 0 && bottom <= innerHeight + row.offsetHeight;
+    return top >= 0 && bottom <= innerHeight + row.offsetHeight;
   })), [true]);
   await page.goto(pathToFileURL(index_file).href);
+});
+
+test('A model is folded and unfolded', async () => {
+  const all = await names();
+  const model = page.locator('.group button').first();
+  const count = await page.locator('tbody').first().locator('.case').count();
+  assert.equal(await model.getAttribute('aria-expanded'), 'true');
+  await model.click();
+  assert.equal((await names()).length, all.length - count);
+  assert.equal(await model.getAttribute('aria-expanded'), 'false');
+  await model.click();
+  assert.deepEqual(await names(), all);
 });
 
 test('Filter and order are in the address, and the way back leads through them', async () => {
@@ -116,7 +139,7 @@ test('Filter and order are in the address, and the way back leads through them',
   const other = await openPage(browser, index_file, {trouble, requests: []});
   await other.goto('about:blank');
   await other.goto(state);
-  assert.deepEqual(await other.$$eval('tbody tr:not([hidden]) th', (cells) => cells.map(
+  assert.deepEqual(await other.$$eval('tr.case th', (cells) => cells.map(
       (cell) => cell.firstChild.textContent)), shown);
   assert.equal(await other.inputValue('#find'), 'tripod');
   await other.close();
@@ -168,7 +191,7 @@ test('A click on a column sorts by it, a second one the other way', async () => 
   assert.deepEqual(walls, [...walls].sort((a, b) => a - b));
   // Scenarios without an error come last.
   await sortBy('error');
-  const errors = await page.$$eval('tbody tr', (rows) => rows.map((row) => row.cells[3].dataset.sort));
+  const errors = await page.$$eval('tr.case', (rows) => rows.map((row) => row.cells[2].dataset.sort));
   const first_empty = errors.indexOf('');
   assert.ok(first_empty > 0 && errors.slice(first_empty).every((text) => text === ''), errors.join());
   assert.equal(await page.locator('thead th[aria-sort]').count(), 1);

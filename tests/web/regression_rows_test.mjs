@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {compare, fits, sortValue, wordsOf} from '../../web/src/regression/rows.js';
+import {compare, countsText, fits, grouped, idOf, linkOf, readRows, sorted as inOrder, wordsOf} from '../../web/src/regression/rows.js';
 
 const row = (text, kind = 'good', mustFail = false) => ({text, kind, mustFail});
 const sorted = (values, up) => [...values].sort((a, b) => compare(a, b, up));
@@ -26,10 +26,39 @@ test('A kind shows its rows only, and what must fail is shown whatever became of
   assert.ok(!fits(rows[0], ['b'], 'good'));
 });
 
-test('A cell is sorted by its number, by nothing if that is empty, else by its text', () => {
-  assert.equal(sortValue('2.5e-9', '2.5e-9 of …'), 2.5e-9);
-  assert.ok(Number.isNaN(sortValue('', '–')));
-  assert.equal(sortValue(undefined, 'four_bar/static'), 'four_bar/static');
+const texts = ['', 'agree', 'fails', 'At rest', 'worst at leg1', 'reaction: not unique'];
+const data = {texts, rows: [
+  ['b/one', 3, 0, 0, 2, 1e-3, 1e-9, [-3.5, -3], [['bad', 2], ['li', 4]], [], 2, 1, 40, 3],
+  ['a/two', 0, 2, 1, 1, null, null, [], [], [5, 5], 1, 3, 30, 2],
+  ['b/three', 0, 2, 0, 1, 2e-12, 1e-9, [-11.7], [], [], 3, 2, 50, 2]]};
+
+test('Rows are read with their texts, and what is missing is no number', () => {
+  const [one, two] = readRows(data);
+  assert.deepEqual([one.model, one.kind, one.description, one.word, one.limit], ['b', 'bad', 'At rest', 'fails', 1e-9]);
+  assert.deepEqual(one.notes, [['bad', 'fails'], ['li', 'worst at leg1']]);
+  assert.ok(Number.isNaN(two.error) && two.mustFail);
+  assert.ok(fits(two, ['unique'], 'must_fail') && fits(one, ['leg1'], 'bad'));
+});
+
+test('Models stand where their worst scenario is, with counts', () => {
+  const groups = grouped(readRows(data));
+  assert.deepEqual(groups.map(({model, rows}) => [model, rows.length]), [['b', 2], ['a', 1]]);
+  assert.equal(countsText(groups[0].counts), '2 scenarios: 1 as expected, 1 not as expected');
+  assert.equal(countsText(groups[1].counts), '1 scenario: 1 as expected');
+});
+
+test('A column orders all rows, both ways', () => {
+  const keys = (column, up) => inOrder(readRows(data), column, up).map(({key}) => key);
+  assert.deepEqual(keys('scenario', true), ['a/two', 'b/one', 'b/three']);
+  assert.deepEqual(keys('error', true), ['b/three', 'b/one', 'a/two'], 'without an error last');
+  assert.deepEqual(keys('error', false), ['b/one', 'b/three', 'a/two']);
+  assert.deepEqual(keys('wall', false), ['b/three', 'b/one', 'a/two']);
+});
+
+test('Links lead to the file whatever its name', () => {
+  const key = 'javascript:alert(1)/a#b?c%d"<!--<script>é';
+  assert.equal(linkOf(key), 'javascript%3Aalert%281%29/a%23b%3Fc%25d%22%3C%21--%3Cscript%3E%C3%A9');
+  assert.ok(!/[%#?<& ]/.test(idOf(key)));
 });
 
 test('What is missing comes last, both ways', () => {

@@ -4,72 +4,32 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <optional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "base/demand.h"
+#include "base/json_text.h"
 #include "base/markup.h"
 #include "base/png.h"
 #include "base/sha256.h"
 #include "features/regress/index_assets.h"
 #include "features/regress/summaries.h"
 #include "features/regress/trouble_text.h"
-#include "plot/svg.h"
 
 namespace mbv {
 namespace {
 
-// Kind for the filter and colour: "bad", "warn" or "good".
-const char* KindOf(const CaseResult& result) {
-  return result.failed() ? "bad" : result.drifts.empty() ? "good" : "warn";
-}
+// For the filter and colour: 0 bad, 1 warn, 2 good.
+int KindOf(const CaseResult& result) { return result.failed() ? 0 : result.drifts.empty() ? 2 : 1; }
 
 constexpr double kLowestValue = 1e-17;  // what is smaller is drawn there: below any round-off
-constexpr double kCurveRoom = 0.5, kLimitRoom = 0.3;  // decades above and below
+constexpr size_t kRunsShown = 12;       // of a course
 
-// Course of the key metric on a logarithmic scale, oldest left, with its limit.
-std::string Sparkline(const CaseResult& result) {
-  constexpr double kWidth = 120.0, kHeight = 32.0, kMargin = 3.0;
-  const auto* key = KeyMetric(result);
-  std::vector<double> levels;
-  for (double value : result.course) levels.push_back(std::log10(std::max(value, kLowestValue)));
-  std::erase_if(levels, [](double level) { return !std::isfinite(level); });
-  if (key == nullptr || levels.size() < 2) return "";
-  const auto [low, high] = std::minmax_element(levels.begin(), levels.end());
-  double bottom = *low - kCurveRoom, top = *high + kCurveRoom;
-  std::optional<double> limit;
-  if (key->second.limit && *key->second.limit > 0.0) {
-    limit = std::log10(*key->second.limit);
-    top = std::max(top, *limit + kLimitRoom);
-    bottom = std::min(bottom, *limit - kLimitRoom);
-  }
-  const auto y = [&](double level) {
-    return kMargin + (kHeight - 2.0 * kMargin) * (top - level) / (top - bottom);
-  };
-  std::string points;
-  double x = 0.0;
-  for (size_t i = 0; i < levels.size(); ++i) {
-    x = kMargin +
-        (kWidth - 2.0 * kMargin) * static_cast<double>(i) / static_cast<double>(levels.size() - 1);
-    points += fmt::format("{}{:.1f},{:.1f}", i == 0 ? "" : " ", x, y(levels[i]));
-  }
-  const std::string content =
-      (limit ? SvgShape("path", {{"class", "limit"},
-                                 {"d", fmt::format("M0 {:.1f}H{:g}", y(*limit), kWidth)}})
-             : "") +
-      SvgShape("polyline", {{"class", "curve"}, {"points", points}}) +
-      SvgShape("circle", {{"class", "now"}, {"cx", x, 1}, {"cy", y(levels.back()), 1}, {"r", 2.5}});
-  return SvgElement(
-      "svg",
-      {{"width", kWidth},
-       {"height", kHeight},
-       {"viewBox", fmt::format("0 0 {:g} {:g}", kWidth, kHeight)},
-       {"role", "img"},
-       {"aria-label",
-        fmt::format("last {} runs: {:.1e} to {:.1e}, now {:.1e}", levels.size(),
-                    std::pow(10.0, *low), std::pow(10.0, *high), std::pow(10.0, levels.back()))}},
-      content);
-}
-
-constexpr size_t kChecksOfACase = 5, kChecksOfARow = 1, kCasesInABox = 30;
+constexpr size_t kChecksOfACase = 5, kChecksOfARow = 1;
+constexpr size_t kCasesInABox = 30, kMostInABox = 200;
 
 // Where a case's row is: a name without anything that an address would encode.
 std::string RowId(const CaseResult& result) {
@@ -78,101 +38,98 @@ std::string RowId(const CaseResult& result) {
   return "case/" + id;
 }
 
+// The table as the page's script draws it (rows.js): texts that occur again by number, a short
+// array for each scenario.
+class TableData {
+ public:
+  void Add(const CaseResult& result) {
+    const auto* key = KeyMetric(result);
+    Json course = Json::array();
+    if (key != nullptr) {
+      const size_t first = result.course.size() - std::min(kRunsShown, result.course.size());
+      for (size_t i = first; i < result.course.size(); ++i) {
+        const double level = std::log10(std::max(result.course[i], kLowestValue));
+        if (std::isfinite(level)) course.push_back(Rounded(level, "{:.1f}"));
+      }
+    }
+    Json open = Json::array();
+    for (const Unmeasured& item : result.not_compared)
+      open.push_back(Text(item.what + ": " + item.why));
+    rows_.push_back(
+        {result.key, Text(result.description), KindOf(result),
+         result.expected.verdict == "agree" ? 0 : 1, Text(WordOf(result)),
+         key == nullptr ? Json() : Rounded(key->second.value, "{:.3g}"),
+         key == nullptr || !key->second.limit ? Json() : Rounded(*key->second.limit, "{:.2g}"),
+         std::move(course), Notes(result), std::move(open), Rounded(result.cost.wall_s, "{:.1f}"),
+         Rounded(result.cost.cpu_s, "{:.1f}"), Rounded(result.cost.peak_mib(), "{:.0f}"),
+         (result.has_report ? 1 : 0) + (result.has_folder ? 2 : 0)});
+  }
+
+  [[nodiscard]] std::string Write(const std::map<std::string, std::string>& pictures) && {
+    return EscapeScript(DumpLine(
+        Json{{"texts", std::move(texts_)}, {"pictures", pictures}, {"rows", std::move(rows_)}}));
+  }
+
+ private:
+  using Json = nlohmann::ordered_json;
+
+  // As many digits as are shown.
+  static Json Rounded(double value, const char* digits) {
+    return std::isfinite(value) ? Json(std::stod(fmt::format(fmt::runtime(digits), value)))
+                                : Json();
+  }
+
+  size_t Text(const std::string& text) {
+    const auto [at, is_new] = numbers_.try_emplace(text, texts_.size());
+    if (is_new) texts_.push_back(text);
+    return at->second;
+  }
+
+  // What a reader should know beyond the numbers.
+  Json Notes(const CaseResult& result) {
+    Json notes = Json::array();
+    const auto add = [&](const char* kind, const std::string& text) {
+      notes.push_back({kind, Text(text)});
+    };
+    if (result.failed()) {
+      add("bad", result.reason);
+      for (const std::string& text : FailureTexts(result, kChecksOfARow)) add("li", text);
+    }
+    if (!result.drifts.empty()) add("warn", DriftLine(result));
+    if (!result.failed() && !result.verified) add("soft", result.reason);
+    for (const std::string& caveat : result.caveats) add("warn", "caveat: " + caveat);
+    if (!result.log_tail.empty()) add("log", result.log_tail);
+    return notes;
+  }
+
+  Json texts_ = Json::array(), rows_ = Json::array();
+  std::map<std::string, size_t> numbers_;
+};
+
 std::string ListOf(const std::vector<std::string>& texts) {
   std::string html;
   for (const std::string& text : texts) html += "<li>" + EscapeMarkup(text) + "</li>";
   return html.empty() ? "" : "<ul>" + html + "</ul>";
 }
 
-// What a reader should know beyond the numbers.
-std::string Notes(const CaseResult& result) {
-  std::string text;
-  if (result.failed()) {
-    text += "<p class=\"bad\">" + EscapeMarkup(result.reason) + "</p>" +
-            ListOf(FailureTexts(result, kChecksOfARow));
-  }
-  if (!result.drifts.empty()) {
-    text += "<p class=\"warn\">" + EscapeMarkup(DriftLine(result)) + "</p>";
-  }
-  if (!result.failed() && !result.verified) {
-    text += "<p class=\"soft\">" + EscapeMarkup(result.reason) + "</p>";
-  }
-  for (const std::string& caveat : result.caveats) {
-    text += "<p class=\"warn\">caveat: " + EscapeMarkup(caveat) + "</p>";
-  }
-  if (!result.not_compared.empty()) {
-    text +=
-        fmt::format("<details><summary>{} not compared</summary><ul>", result.not_compared.size());
-    for (const Unmeasured& item : result.not_compared) {
-      text += "<li>" + EscapeMarkup(item.what) + ": " + EscapeMarkup(item.why) + "</li>";
-    }
-    text += "</ul></details>";
-  }
-  if (!result.log_tail.empty()) {
-    text += "<details><summary>last output</summary><pre tabindex=\"0\">" +
-            EscapeMarkup(result.log_tail) + "</pre></details>";
-  }
-  return text;
-}
-
-std::string Links(const CaseResult& result) {
-  const std::string key = EncodeLink(result.key);
-  std::string text;
-  if (result.has_report) text += fmt::format("<a href=\"{}/report.html\">report</a> ", key);
-  if (result.has_folder) text += fmt::format("<a href=\"{}/summary.json\">numbers</a> ", key);
-  return text + fmt::format("<a href=\"logs/{}.txt\">log</a>", key);
-}
-
-// `severity` is the row's place in the usual order.
-std::string Row(const CaseResult& result, const std::string& thumbnail, size_t severity) {
-  const auto* key = KeyMetric(result);
-  const std::string picture = thumbnail.empty()
-                                  ? ""
-                                  : fmt::format(
-                                        "<img src=\"{}\" alt=\"Mechanism at the first snapshot\" "
-                                        "loading=\"lazy\">",
-                                        EscapeMarkup(thumbnail));
-  std::string row = fmt::format(
-      "<tr id=\"{}\" data-kind=\"{}\"{}><td class=\"picture\">{}</td>", EscapeMarkup(RowId(result)),
-      KindOf(result), result.expected.verdict == "agree" ? "" : " data-must-fail", picture);
-  row += fmt::format("<th scope=\"row\">{}<br><span class=\"soft\">{}</span><br>{}</th>",
-                     EscapeMarkup(result.key), EscapeMarkup(result.description), Links(result));
-  row += fmt::format("<td class=\"word {}\" data-sort=\"{}\">{}</td>", KindOf(result), severity,
-                     EscapeMarkup(WordOf(result)));
-  row += fmt::format("<td class=\"n\" data-label=\"error\" data-sort=\"{}\">{}</td>",
-                     key == nullptr || !std::isfinite(key->second.value)
-                         ? ""
-                         : fmt::format("{:.6g}", key->second.value),
-                     key == nullptr ? "–" : fmt::format("{:.1e}", key->second.value));
-  row += fmt::format(
-      "<td class=\"n\" data-label=\"limit\" data-sort=\"{0}\">{0}</td>",
-      key == nullptr || !key->second.limit ? "" : fmt::format("{:.1e}", *key->second.limit));
-  row += "<td class=\"course\">" + Sparkline(result) + "</td><td class=\"notes\">" + Notes(result) +
-         "</td>";
-  for (const auto& [label, value] :
-       {std::pair{"wall [s]", result.cost.wall_s}, std::pair{"CPU [s]", result.cost.cpu_s}}) {
-    row += fmt::format("<td class=\"n\" data-label=\"{0}\" data-sort=\"{1:.3f}\">{1:.1f}</td>",
-                       label, value);
-  }
-  return row + fmt::format(
-                   "<td class=\"n\" data-label=\"memory [MiB]\" data-sort=\"{0:.1f}\">{0:.0f}</td>"
-                   "</tr>\n",
-                   result.cost.peak_mib());
-}
-
-// A list with a title; what is beyond kCasesInABox is folded away.
+// A list with a title; what is beyond kCasesInABox is folded away, beyond kMostInABox left to the
+// table.
 std::string Framed(const char* kind, const char* id, const std::string& title,
                    const std::vector<std::string>& items) {
   if (items.empty()) return "";
+  const size_t shown = std::min(items.size(), kMostInABox);
   std::string html = fmt::format(
       "<section class=\"box {0}\" aria-labelledby=\"{1}\"><h2 id=\"{1}\">{2} {3}</h2>\n"
       "<ul>",
       kind, id, items.size(), title);
-  for (size_t i = 0; i < items.size(); ++i) {
+  for (size_t i = 0; i < shown; ++i) {
     if (i == kCasesInABox) {
       html += fmt::format("</ul><details><summary>{} more</summary><ul>", items.size() - i);
     }
     html += "<li>" + items[i] + "</li>\n";
+  }
+  if (shown < items.size()) {
+    html += fmt::format("<li>{} more in the table below</li>\n", items.size() - shown);
   }
   return html + (items.size() > kCasesInABox ? "</ul></details>" : "</ul>") + "</section>\n";
 }
@@ -219,47 +176,40 @@ std::string Head(const RegressReport& report) {
   return text;
 }
 
-constexpr const char* kControls = R"html(<form role="search">
-<label>Find<input id="find" type="search" placeholder="model, scenario, text"></label>
-<label>Show<select id="kind"><option value="">all</option><option value="bad">not as expected</option>
-<option value="warn">drift</option><option value="good">as expected</option>
-<option value="must_fail">must fail</option></select></label>
-<span id="shown" class="soft" role="status"></span></form>
-<table><caption class="soft">Error: drive forces, RMS over all drives of one
-unit; the worst entry of a stiffness; the largest of an output's place [m] in a
-free motion; simulated against analytic where both ran. The worst results come first; a column's
-name sorts by it.</caption><thead><tr>
-<td class="plain"></td><th scope="col" data-key="scenario"><button>scenario</button></th>
-<th scope="col" data-key="result" aria-sort="ascending"><button>result</button></th>
-<th scope="col" data-key="error"><button>error</button></th>
-<th scope="col" data-key="limit"><button>limit</button></th>
-<th scope="col" class="plain">last runs</th><th scope="col" class="plain">notes</th>
-<th scope="col" data-key="wall"><button>wall [s]</button></th>
-<th scope="col" data-key="cpu"><button>CPU [s]</button></th>
-<th scope="col" data-key="memory"><button>memory [MiB]</button></th>
-</tr></thead><tbody>
-)html";
+// The skeleton with its places filled.
+std::string Filled(std::string_view skeleton,
+                   const std::map<std::string_view, std::string_view>& values) {
+  std::string page;
+  for (size_t at = 0; at < skeleton.size();) {
+    const size_t begin = std::min(skeleton.find("{{", at), skeleton.size());
+    page += skeleton.substr(at, begin - at);
+    if (begin == skeleton.size()) break;
+    const size_t end = skeleton.find("}}", begin);
+    MBV_DEMAND(end != std::string_view::npos, begin);
+    page += values.at(skeleton.substr(begin + 2, end - begin - 2));
+    at = end + 2;
+  }
+  return page;
+}
 
 }  // namespace
 
 std::string ToIndexHtml(const RegressReport& report,
-                        const std::map<std::string, std::string>& thumbnails) {
+                        const std::map<std::string, std::string>& pictures) {
   const std::vector<const CaseResult*> cases = BySeverity(report);
-  std::string html = fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
-      "style-src {}; script-src {}\">"
-      "<title>mbverify regression {}: {}</title><style>{}</style></head><body>\n",
-      CspHash(IndexStyle()), CspHash(IndexScript()), EscapeMarkup(report.run.started_utc),
-      ExitCodeOf(report) == 0 ? "all as expected" : "not as expected", IndexStyle());
-  html += kIndexMain + Head(report) + Boxes(report, cases) + kControls;
-  for (size_t i = 0; i < cases.size(); ++i) {
-    const auto thumbnail = thumbnails.find(cases[i]->key);
-    html += Row(*cases[i], thumbnail == thumbnails.end() ? "" : thumbnail->second, i);
-  }
-  return html + fmt::format("</tbody></table>\n</main>\n<script>{}</script></body></html>\n",
-                            IndexScript());
+  TableData table;
+  for (const CaseResult* result : cases) table.Add(*result);
+  const std::string title =
+      fmt::format("mbverify regression {}: {}", EscapeMarkup(report.run.started_utc),
+                  ExitCodeOf(report) == 0 ? "all as expected" : "not as expected");
+  return Filled(IndexPage(), {{"style_hash", CspHash(IndexStyle())},
+                              {"script_hash", CspHash(IndexScript())},
+                              {"title", title},
+                              {"style", IndexStyle()},
+                              {"head", Head(report)},
+                              {"boxes", Boxes(report, cases)},
+                              {"data", std::move(table).Write(pictures)},
+                              {"script", IndexScript()}});
 }
 
 // Thumbnails: PNG → smaller PNG → data URI.
@@ -267,6 +217,29 @@ std::string ToIndexHtml(const RegressReport& report,
 namespace {
 
 constexpr std::uint64_t kMostPixels = 1ULL << 26;  // 8192 × 8192, the largest that is drawn
+
+// Without the caption bar, which is white under a rule across the whole picture: its words would be
+// too small to read.
+Picture WithoutCaption(Picture image) {
+  const auto pixel = [&](int x, int y) {
+    return image.rgb.data() +
+           3 * (static_cast<size_t>(y) * static_cast<size_t>(image.width) + static_cast<size_t>(x));
+  };
+  const auto is_like = [&](int y, const std::uint8_t* color) {
+    for (int x = 0; x < image.width; ++x) {
+      if (!std::equal(color, color + 3, pixel(x, y))) return false;
+    }
+    return true;
+  };
+  constexpr std::uint8_t kWhite[] = {255, 255, 255};
+  for (int y = image.height - 2; y > image.height / 2; --y) {
+    if (!is_like(y + 1, kWhite) || is_like(y, kWhite) || !is_like(y, pixel(0, y))) continue;
+    image.height = y;
+    image.rgb.resize(3 * static_cast<size_t>(image.width) * static_cast<size_t>(image.height));
+    break;
+  }
+  return image;
+}
 
 // Mean of the pixels under each new one, in 32 levels per colour: small files.
 Picture Shrink(const Picture& image, int width) {
@@ -303,7 +276,8 @@ Picture Shrink(const Picture& image, int width) {
 std::string ThumbnailUri(const std::string& png, int width_px) {
   Picture picture;
   if (width_px < 1 || !DecodePng(png, kMostPixels, &picture)) return "";
-  return "data:image/png;base64," + EncodeBase64(EncodePng(Shrink(picture, width_px)));
+  return "data:image/png;base64," +
+         EncodeBase64(EncodePng(Shrink(WithoutCaption(std::move(picture)), width_px)));
 }
 
 }  // namespace mbv

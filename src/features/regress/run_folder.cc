@@ -214,16 +214,19 @@ namespace fs = std::filesystem;
 
 constexpr double kThumbnailTimeout_s = 20.0;
 constexpr int kThumbnailPx = 144;
+constexpr size_t kMostThumbnails = 40;
 constexpr size_t kHeadBytes = 200;  // of a file, which show what it is
 
-// Pictures may be anybody's (merge): children decode them.
+// One of each model. Pictures may be anybody's (merge): children decode them.
 std::map<std::string, std::string> Thumbnails(const RunFolder& folder,
                                               const RegressReport& report) {
-  std::vector<std::pair<std::string, fs::path>> pictures;  // by key
+  std::vector<std::pair<std::string, fs::path>> pictures;  // by model
   for (const CaseResult& result : report.cases) {
-    if (!result.has_folder) continue;
+    std::string model = result.key.substr(0, result.key.find('/'));
+    if (!result.has_folder || pictures.size() == kMostThumbnails) continue;
+    if (!pictures.empty() && pictures.back().first == model) continue;  // cases are sorted
     if (auto picture = folder.Snapshot(result.key)) {
-      pictures.emplace_back(result.key, *std::move(picture));
+      pictures.emplace_back(std::move(model), *std::move(picture));
     }
   }
   const auto texts = InChildren(pictures.size(), kThumbnailTimeout_s, [&](size_t i) {

@@ -22,10 +22,10 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// A summary for job pages: counts, what failed, what drifted, and the table of all scenarios.
 [[nodiscard]] std::string ToMarkdown(const RegressReport& report);
 
-/// One self-contained page; `thumbnails` are data URIs by scenario key. Links go to
-/// <key>/report.html beside the page.
+/// One self-contained page; `pictures` are data URIs by model. Links go to <key>/report.html beside
+/// the page.
 [[nodiscard]] std::string ToIndexHtml(const RegressReport& report,
-                                      const std::map<std::string, std::string>& thumbnails);
+                                      const std::map<std::string, std::string>& pictures);
 
 /// What failed and drifted, then the counts, for a terminal.
 [[nodiscard]] std::string ToSummaryText(const RegressReport& report);
@@ -42,7 +42,8 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// analytic)": the key metric as text; "" if there is none.
 [[nodiscard]] std::string KeyText(const CaseResult& result);
 
-/// Smaller copy of a PNG as a data URI, at most `width_px` wide; "" if it is not a PNG.
+/// Smaller copy of a PNG without its caption bar as a data URI, at most `width_px` wide; "" if it
+/// is not a PNG.
 [[nodiscard]] std::string ThumbnailUri(const std::string& png, int width_px);
 
 }  // namespace mbv
