@@ -1,7 +1,10 @@
 // Links between documents resolve: files, pictures and headings (#…) of README.md, docs/ and models/.
+// Prose is at most 100 columns wide.
 //   node check_links.mjs ROOT
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { dirname, join, normalize } from 'node:path';
+
+const kColumns = 100;
 
 // Text without code: blocks between fences, and words in backquotes.
 function prose(text) {
@@ -18,6 +21,12 @@ function anchorsIn(text) {
 function broken(pages, exists) {
   const found = [];
   for (const [page, text] of Object.entries(pages)) {
+    let code = false;
+    text.split('\n').forEach((line, i) => {
+      if (/^ *```/.test(line)) code = !code;
+      const free = code || /^ *(\||!\[|<!--)/.test(line) || /results\/|CHANGELOG/.test(page) || !/\S \S/.test(line.slice(0, 100).trim());
+      if (!free && [...line].length > kColumns) found.push(`${page}:${i + 1}: ${[...line].length} columns`);
+    });
     for (const [, target] of prose(text).matchAll(/\]\(([^)\s]+)\)/g)) {
       if (/^[a-z]+:/.test(target)) continue;
       const [file, anchor] = target.split('#');
@@ -35,10 +44,11 @@ function broken(pages, exists) {
 // The check itself must be able to fail.
 const planted = {
   'docs/a.md': '[b](sub/b.md#two-words) [up](../README.md) [web](https://x.org/y) `[no](code.md)`\n' +
-      '```sh\n[no](fence.md)\n```\n[gone](b.md) [head](sub/b.md#three) ![p](p.png)',
+      '```sh\n[no](fence.md)\n```\n[gone](b.md) [head](sub/b.md#three) ![p](p.png)\n' +
+      `${'wide '.repeat(21)}\n| ${'wide '.repeat(30)}|`,
   'docs/sub/b.md': '# Two words\n',
 };
-const wanted = ['docs/a.md: there is no b.md', 'docs/a.md: no heading sub/b.md#three', 'docs/a.md: there is no p.png'];
+const wanted = ['docs/a.md:6: 105 columns', 'docs/a.md: there is no b.md', 'docs/a.md: no heading sub/b.md#three', 'docs/a.md: there is no p.png'];
 const self = broken(planted, (path) => path in planted || path === 'README.md');
 if (self.join() !== wanted.join()) {
   console.log(`check_links: the self-test wanted '${wanted}', found '${self}'`);

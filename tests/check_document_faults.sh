@@ -1,8 +1,8 @@
 #!/bin/bash
-# check_tutorial.sh takes a document that is right, and none that is wrong in one place.
-#   check_tutorial_faults.sh PROGRAM
+# check_document.sh takes a document that is right, and none that is wrong in one place.
+#   check_document_faults.sh PROGRAM SOURCE_DIR
 set -u
-program=$1 here=$(dirname "$0")
+program=$1 source_dir=$2 here=$(dirname "$0")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cat >"$work/right.md" <<'END'
@@ -35,7 +35,7 @@ $ echo $?
 END
 failed=0
 expect() {  # WANTED_EXIT WHAT
-  "$here/check_tutorial.sh" "$work/document.md" "$program" >"$work/said" 2>&1
+  "$here/check_document.sh" "$work/document.md" "$program" >"$work/said" 2>&1
   local got=$?
   [ "$got" = "$1" ] || { echo "$2: exit code $got"; cat "$work/said"; failed=1; }
 }
@@ -55,5 +55,42 @@ perturbed "an exit code that nobody asks for" '/^\$ echo/,/^2$/d'
 perturbed "a block without a file" 's/^`models.*continued$/and more/'
 perturbed "a missing block" '/continued$/,/^```$/d'
 perturbed "a block of another kind" 's/^```console$/```sh/'
+# In the tree: blocks of commands, files by marks, and what is left out.
+cat >"$work/right.md" <<'END'
+<!-- file: note.txt -->
+```text
+two
+```
+
+```sh
+mbverify list >list.txt    # what is shipped is there
+grep -q four_bar/turn list.txt
+grep -q two note.txt
+```
+
+```yaml
+a: fragment
+```
+
+<!-- not run: it needs a key -->
+```sh
+exit 1
+```
+END
+expect() {
+  "$here/check_document.sh" "$work/document.md" "$program" --in-tree "$source_dir" >"$work/said" 2>&1
+  local got=$?
+  [ "$got" = "$1" ] || { echo "$2: exit code $got"; cat "$work/said"; failed=1; }
+}
+cp "$work/right.md" "$work/document.md"
+expect 0 "the document of the tree that is right"
+grep -q "1 blocks are not run" "$work/said" || { echo "what is not run is not counted"; failed=1; }
+perturbed "a command that fails" 's/^grep -q two/grep -q three/'
+perturbed "a failure before the last command" 's/four_bar\/turn/no_such_scenario/'
+perturbed "a file without its mark" '/file: note/d'
+perturbed "an unknown mark" 's/not run:/skipped:/'
+perturbed "a mark without a reason" 's/not run: .* -->/not run: -->/'
+perturbed "a mark that is not before its block" 's/^<!-- not run.*/&\nText between./'
+perturbed "a block that does not end" '$d'
 [ $failed = 0 ] && echo "every fault is found"
 exit $failed
