@@ -44,7 +44,7 @@ awk -v blocks="$work/blocks" -v in_tree="$tree" '
   /^<!--.*-->$/ { mark = $0; sub(/^<!-- */, "", mark); sub(/ *-->$/, "", mark)
                   if (mark ~ /^not run: *[^ ]/) reason = mark
                   else if (mark ~ /^file: *[^ ]+$/) { file = mark; sub(/^file: */, "", file) }
-                  else if (mark ~ /^accuracy: /) next  # a table that the program writes
+                  else if (mark ~ /^(accuracy|step study): /) next  # tables that programs and tests look for
                   else wrong("a mark that is none: " $0)
                   next }
   /^```/ { inside = 1; out = ""
