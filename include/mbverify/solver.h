@@ -68,6 +68,7 @@ class Model {
  public:
   /// `name`: of a model that the program comes with or that lies in models/, or the path of a
   /// model.yaml, URDF (.urdf) or MJCF (.xml). `parameters` of a model.yaml, others than its own.
+  /// One thread loads at a time.
   [[nodiscard]] static Model Load(const std::string& name,
                                   const std::map<std::string, double>& parameters = {});
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 
 #include "features/paper/signals.h"
 #include "plot/layout.h"
@@ -97,9 +98,10 @@ class FigureMaker {
     return panel;
   }
 
-  // |difference| of all drives together, for each pair that was compared.
+  // |difference| of all drives together, for each pair that was compared, and the limit.
   FigurePanel DifferencePanel(const std::vector<std::string>& drives, const ShownUnit& unit) const {
     FigurePanel panel{.x = TimeAxis(), .y = {.log = true}, .share = kSmallPanel};
+    std::optional<double> limit;  // of the first pair that states one
     for (const PairComparison& pair : report_.comparison.pairs) {
       const Trace* measured = TraceOf(report_, pair.measured);
       const Trace* truth = TraceOf(report_, pair.truth);
@@ -111,8 +113,32 @@ class FigureMaker {
                                        SayWitness(pair.truth, language_),
                               .points = Scaled(Envelope(points, kDifferenceSpans), time_, unit),
                               .look = static_cast<int>(panel.curves.size())});
+      if (!limit) limit = LimitIn(pair, points, drives);
+    }
+    if (limit) {
+      const std::vector<double>& times = line_->trace.time_s;
+      panel.curves.push_back(
+          {.label = In(FigureWord::kLimit),
+           .points = Scaled({{times.front(), *limit}, {times.back(), *limit}}, time_, unit),
+           .look = -1});
     }
     return panel;
+  }
+
+  // The limit of the largest difference [N or N m]: the check has it as a share, and its worst
+  // sample shows of what.
+  [[nodiscard]] std::optional<double> LimitIn(const PairComparison& pair, const PlotPoints& points,
+                                              const std::vector<std::string>& drives) const {
+    const CheckResult* check = report_.comparison.FindCheck(pair.name() + ".force_max");
+    const auto worst = pair.metrics.find(Metric::kForceMax);
+    if (check == nullptr || !check->limit || worst == pair.metrics.end()) return std::nullopt;
+    const bool here = std::ranges::any_of(drives, [&](const std::string& drive) {
+      return ChannelName(Quantity::kForce, drive) == worst->second.channel;
+    });
+    if (!here || !(worst->second.value > 0.0)) return std::nullopt;
+    double largest = 0.0;
+    for (const auto& [t, difference] : points) largest = std::fmax(largest, difference);
+    return *check->limit * largest / worst->second.value;
   }
 
   static PlotPoints LargestDifferences(const Trace& measured, const Trace& truth,

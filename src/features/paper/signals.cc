@@ -40,6 +40,7 @@ constexpr std::array<Translations, static_cast<size_t>(FigureWord::kCount_)> kWo
     {"step alone", "仅步长", "nur Schrittweite"},
     {"Distance from the axis", "到轴线的距离", "Abstand von der Achse"},
     {"azimuth", "方位角", "Azimut"},
+    {"limit", "限值", "Grenze"},
 }};
 
 struct WitnessWords {

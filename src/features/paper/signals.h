@@ -46,6 +46,7 @@ enum class FigureWord {
   kStepAlone,
   kAxisDistance,
   kAzimuth,
+  kLimit,
   kCount_,
 };
 [[nodiscard]] std::string WordFor(FigureWord word, Language language);

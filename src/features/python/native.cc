@@ -377,6 +377,5 @@ PYBIND11_MODULE(_native, m) {
       make("UnsupportedError", raised.solver, "The model has what this does not cover.");
   py::register_exception_translator(&mbv::Translate);
   m.def("load", &mbv::Model::Load, "name"_a, "parameters"_a = std::map<std::string, double>(),
-        py::call_guard<py::gil_scoped_release>(),
         "A model by name or the path of its model.yaml, URDF or MJCF file.");
 }

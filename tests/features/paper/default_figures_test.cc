@@ -69,6 +69,7 @@ TEST(DefaultFigures, OnePerturbedSampleShowsInTheDifferences) {
   std::vector<std::string> pairs;
   for (const FigureCurve& curve : forces.panels[1].curves) {
     pairs.push_back(curve.label);
+    if (curve.label == "limit") continue;
     double largest = 0;
     for (const auto& [t, difference] : curve.points) {
       if (difference > largest) {
@@ -78,7 +79,31 @@ TEST(DefaultFigures, OnePerturbedSampleShowsInTheDifferences) {
     }
     EXPECT_NEAR(largest, 0.25, 1e-13);
   }
-  EXPECT_THAT(pairs, ElementsAre("simulation − analytic", "simulation − reference"));
+  EXPECT_THAT(pairs, ElementsAre("simulation − analytic", "simulation − reference", "limit"));
+}
+
+// 0.25 N of the largest force, and a limit of a thousandth of that.
+TEST(DefaultFigures, TheLimitIsALineAmongTheDifferences) {
+  synthetic::Case c;
+  c.simulated.values(40, c.simulated.Find("d2.force")) += 0.25;
+  Report report = test::SampledReport(c);
+  double share = 0.0, limit = 0.0;
+  for (PairComparison& pair : report.comparison.pairs) {
+    if (pair.measured == "simulated" && pair.truth == "analytic") {
+      share = pair.metrics.at(Metric::kForceMax).value;
+    }
+  }
+  for (const CheckResult& check : report.comparison.checks) {
+    if (check.name == "simulated_vs_analytic.force_max") limit = *check.limit;
+  }
+  ASSERT_GT(share, 0.0);
+  ASSERT_GT(limit, 0.0);
+  const FigureSet set = DefaultFigures(report, Language::kGerman);
+  const FigureCurve& line = Named(set, "drive_forces").panels[1].curves.back();
+  EXPECT_EQ(line.label, "Grenze");
+  ASSERT_EQ(line.points.size(), 2U);
+  EXPECT_NEAR(line.points[0].second, limit / share * 0.25, 1e-12);
+  EXPECT_EQ(line.points[0].second, line.points[1].second);
 }
 
 TEST(DefaultFigures, WithoutDifferencesTheyAreLeftOutAndThisIsReported) {

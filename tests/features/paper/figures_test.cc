@@ -71,23 +71,27 @@ TEST(MakeFigures, DrawsWhatAMotionAndItsRunGave) {
   // In the file one path goes through all of its points: to the right with time, upwards with the
   // torque, on one scale each.
   const FigurePoints& points = figure.panels[0].curves[0].points;
+  // (Cairo leaves out points on a straight line between their neighbours.)
   const auto value = [](const auto& a, const auto& b) { return a.second < b.second; };
-  const auto low = static_cast<size_t>(std::ranges::min_element(points, value) - points.begin());
-  const auto high = static_cast<size_t>(std::ranges::max_element(points, value) - points.begin());
+  const auto [low, high] = std::ranges::minmax_element(points, value);
   size_t found = 0;
   for (const test::SvgPath& path : test::PathsOf(outcome.files[1].second)) {
-    if (path.points.size() != points.size()) continue;
-    ++found;
     const auto& drawn = path.points;
+    if (drawn.size() > points.size() || 10 * drawn.size() < 9 * points.size()) continue;
+    ++found;
+    const auto [top, bottom] = std::ranges::minmax_element(drawn, value);
     const double pt_per_s = (drawn.back().first - drawn.front().first) / points.back().first;
-    const double pt_per_Nm =
-        (drawn[high].second - drawn[low].second) / (points[high].second - points[low].second);
+    const double pt_per_Nm = (top->second - bottom->second) / (high->second - low->second);
     EXPECT_GT(pt_per_s, 0.0);
     EXPECT_LT(pt_per_Nm, 0.0);
-    for (size_t i = 0; i < points.size(); ++i) {
-      EXPECT_NEAR(drawn[i].first, drawn.front().first + pt_per_s * points[i].first, 0.02);
-      EXPECT_NEAR(drawn[i].second,
-                  drawn[low].second + pt_per_Nm * (points[i].second - points[low].second), 0.02);
+    size_t k = 1;
+    for (const auto& [time, torque] : points) {
+      const double x = drawn.front().first + pt_per_s * time;
+      while (k + 1 < drawn.size() && drawn[k].first < x) ++k;
+      const auto &before = drawn[k - 1], &after = drawn[k];
+      const double y =
+          std::lerp(before.second, after.second, (x - before.first) / (after.first - before.first));
+      EXPECT_NEAR(y, bottom->second + pt_per_Nm * (torque - low->second), 0.02) << time;
     }
   }
   EXPECT_EQ(found, 1u);
