@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "features/paper/signals.h"
 #include "plot/layout.h"
@@ -16,6 +17,7 @@ namespace mbv {
 namespace {
 
 constexpr double kSmallPanel = 0.6;  // of differences, against the panel above
+constexpr size_t kMarkerStep = 8;    // of the spans of differences
 
 bool Turns(const std::string& force_unit) { return force_unit == "N m"; }
 
@@ -109,10 +111,13 @@ class FigureMaker {
       const PlotPoints points = LargestDifferences(*measured, *truth, drives);
       const bool any = std::ranges::any_of(points, [](const auto& p) { return p.second > 0; });
       if (!any) continue;
-      panel.curves.push_back({.label = SayWitness(pair.measured, language_) + " − " +
-                                       SayWitness(pair.truth, language_),
-                              .points = Scaled(Envelope(points, kDifferenceSpans), time_, unit),
-                              .look = static_cast<int>(panel.curves.size())});
+      FigureCurve curve{
+          .label = SayWitness(pair.measured, language_) + " − " + SayWitness(pair.truth, language_),
+          .points = Scaled(Envelope(points, kDifferenceSpans), time_, unit),
+          .look = static_cast<int>(panel.curves.size())};
+      // Where two witnesses agree far better, the third differs from both by the same.
+      if (panel.curves.size() >= 2) AsMarkers(&curve);
+      panel.curves.push_back(std::move(curve));
       if (!limit) limit = LimitIn(pair, points, drives);
     }
     if (limit) {
@@ -123,6 +128,17 @@ class FigureMaker {
            .look = -1});
     }
     return panel;
+  }
+
+  // Some of its points, through which what lies below is seen.
+  static void AsMarkers(FigureCurve* curve) {
+    FigurePoints some;
+    for (size_t i = kMarkerStep / 2; i < curve->points.size(); i += kMarkerStep) {
+      some.push_back(curve->points[i]);
+    }
+    curve->points = std::move(some);
+    curve->line = false;
+    curve->marker = curve->look - 2;
   }
 
   // The limit of the largest difference [N or N m]: the check has it as a share, and its worst

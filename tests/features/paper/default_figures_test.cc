@@ -82,6 +82,21 @@ TEST(DefaultFigures, OnePerturbedSampleShowsInTheDifferences) {
   EXPECT_THAT(pairs, ElementsAre("simulation − analytic", "simulation − reference", "limit"));
 }
 
+// Both differ from the simulation by the same: the third curve does not hide the first.
+TEST(DefaultFigures, TheThirdDifferenceIsMarkers) {
+  synthetic::Case c;
+  c.simulated.values.col(c.simulated.Find("d2.force")).array() += 1e-3;
+  c.reference.values.col(c.reference.Find("d2.force")).array() += 1e-12;
+  const FigureSet set = DefaultFigures(test::SampledReport(c), Language::kEnglish);
+  const std::vector<FigureCurve>& curves = Named(set, "drive_forces").panels[1].curves;
+  ASSERT_GE(curves.size(), 3U);
+  EXPECT_TRUE(curves[0].line && curves[1].line && !curves[2].line);
+  EXPECT_GE(curves[2].marker, 0);
+  EXPECT_GT(curves[2].points.size(), 5U);
+  EXPECT_LT(4 * curves[2].points.size(), curves[0].points.size());
+  for (const auto& [t, difference] : curves[2].points) EXPECT_NEAR(difference, 1e-3, 1e-8);
+}
+
 // 0.25 N of the largest force, and a limit of a thousandth of that.
 TEST(DefaultFigures, TheLimitIsALineAmongTheDifferences) {
   synthetic::Case c;
