@@ -11,13 +11,17 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <sstream>
 #include <vector>
 
 namespace mbv {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kSelf = "/proc/self/exe";
 
 std::string Reason() { return std::strerror(errno); }
 
@@ -270,5 +274,27 @@ std::string GrowingFile::Append(std::string_view bytes) {
 }
 
 std::string GrowingFile::Finish() { return Sync(file_) ? "" : Trouble("write"); }
+
+std::filesystem::path ProgramCalled(const std::string& name) {
+  std::error_code error;
+  if (name.find('/') != std::string::npos) return fs::canonical(name, error);
+  const char* variable = std::getenv("PATH");
+  std::istringstream folders(variable != nullptr ? variable : "");
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const fs::path file = fs::path(folder.empty() ? "." : folder) / name;
+    if (access(file.c_str(), X_OK) == 0 && fs::is_regular_file(file, error)) {
+      return fs::canonical(file, error);
+    }
+  }
+  return {};
+}
+
+std::filesystem::path ProgramFile() {
+  std::error_code error;
+  const auto file = std::filesystem::read_symlink(kSelf, error);
+  return error ? ProgramCalled(program_invocation_name) : file;
+}
+
+std::string ProgramToStart() { return access(kSelf, X_OK) == 0 ? kSelf : ProgramFile().string(); }
 
 }  // namespace mbv

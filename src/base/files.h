@@ -55,6 +55,14 @@ class Fingerprint {
 /// lay a link for in advance. Empty, with errno, where none can be made.
 [[nodiscard]] std::filesystem::path MakePrivateFolder(const std::filesystem::path& prefix);
 
+/// The running program's file: by /proc, without it by the name that it was called with and PATH.
+/// Empty if neither leads to it.
+[[nodiscard]] std::filesystem::path ProgramFile();
+/// What starts it again, even where its file has been replaced since.
+[[nodiscard]] std::string ProgramToStart();
+/// ProgramFile() without /proc, of this name.
+[[nodiscard]] std::filesystem::path ProgramCalled(const std::string& name);
+
 /// Six random letters and digits for names that must not be guessed.
 [[nodiscard]] std::string RandomLetters();
 

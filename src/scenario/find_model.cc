@@ -6,6 +6,7 @@
 #include <set>
 
 #include "base/diagnostics.h"
+#include "base/files.h"
 #include "base/text.h"
 
 namespace mbv {
@@ -35,13 +36,12 @@ std::optional<fs::path> ShippedAbove(const fs::path& file) {
 }
 
 // The folder with the models and scenarios that the running program came with, or the library that
-// this is a part of (without /proc the program as well); else those of the installation.
+// this is a part of; else those of an installation.
 std::optional<fs::path> ShippedFolder() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) {
+  if (const fs::path program = ProgramFile(); !program.empty()) {
     if (std::optional<fs::path> folder = ShippedAbove(program)) return folder;
   }
+  std::error_code error;
   Dl_info here;
   if (dladdr(reinterpret_cast<const void*>(&ShippedFolder), &here) != 0 &&
       here.dli_fname != nullptr) {
@@ -50,8 +50,10 @@ std::optional<fs::path> ShippedFolder() {
       if (std::optional<fs::path> folder = ShippedAbove(object)) return folder;
     }
   }
-  const fs::path installed = internal::kInstalledData;
-  return IsFolder(installed / "models") ? std::optional(installed) : std::nullopt;
+  for (const char* installed : {internal::kInstalledData, "/usr/share/mbverify"}) {
+    if (IsFolder(fs::path(installed) / "models")) return installed;
+  }
+  return std::nullopt;
 }
 
 bool IsModelPath(const std::string& name) {
@@ -121,20 +123,29 @@ std::string ModelHint(const std::string& name, const fs::path& start) {
 
 std::string FindScenario(const std::string& argument) {
   std::error_code error;
-  const auto folder = ScenariosFolder();
+  const std::vector<fs::path> folders = ScenarioFolders();
   if (fs::exists(argument, error) || argument.ends_with(".yaml") || argument.ends_with(".urdf") ||
-      argument.empty() || !folder || fs::path(argument).is_absolute()) {
+      argument.empty() || folders.empty() || fs::path(argument).is_absolute()) {
     return argument;
   }
-  const fs::path named = *folder / argument;
-  return IsFolder(named) ? named.string() : named.string() + ".yaml";
+  for (const fs::path& folder : folders) {
+    const fs::path named = folder / argument;
+    if (IsFolder(named)) return named.string();
+    if (IsFile(named.string() + ".yaml")) return named.string() + ".yaml";
+  }
+  return (folders.front() / argument).string() + ".yaml";
 }
 
-std::optional<fs::path> ScenariosFolder() {
-  if (IsFolder("scenarios")) return fs::path("scenarios");
+std::vector<fs::path> ScenarioFolders() {
+  std::vector<fs::path> folders;
+  if (IsFolder("scenarios")) folders.emplace_back("scenarios");
   const auto shipped = ShippedFolder();
-  if (shipped && IsFolder(*shipped / "scenarios")) return *shipped / "scenarios";
-  return std::nullopt;
+  if (!shipped || !IsFolder(*shipped / "scenarios")) return folders;
+  std::error_code error;
+  if (folders.empty() || !fs::equivalent(folders.front(), *shipped / "scenarios", error)) {
+    folders.push_back(*shipped / "scenarios");
+  }
+  return folders;
 }
 
 std::optional<fs::path> ShippedModels() {

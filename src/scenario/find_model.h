@@ -25,7 +25,7 @@ extern const char* const kInstalledData;  ///< <prefix>/share/mbverify, as it wa
 /// What to say about a name that FindModel() does not find.
 [[nodiscard]] std::string ModelHint(const std::string& name, const std::filesystem::path& start);
 
-/// A scenario or folder of them named on a command line: a path, or a name below ScenariosFolder()
+/// A scenario or folder of them named on a command line: a path, or a name below ScenarioFolders()
 /// without its ending ("four_bar/turn", "four_bar"). What is neither is returned as it could be
 /// spelt, for the reader to complain about.
 [[nodiscard]] std::string FindScenario(const std::string& argument);
@@ -33,9 +33,8 @@ extern const char* const kInstalledData;  ///< <prefix>/share/mbverify, as it wa
 /// Names of all models in ModelFolders(start), sorted, each once.
 [[nodiscard]] std::vector<std::string> ModelNames(const std::filesystem::path& start);
 
-/// The folder with the shipped scenarios: ./scenarios, or the one beside ShippedModels(); empty if
-/// there is none.
-[[nodiscard]] std::optional<std::filesystem::path> ScenariosFolder();
+/// Folders with scenarios that names lead to: ./scenarios, then the one beside ShippedModels().
+[[nodiscard]] std::vector<std::filesystem::path> ScenarioFolders();
 
 /// The models that the running program or this library came with: the installed ones, or those of
 /// the source tree that it was built in; empty if there are none.

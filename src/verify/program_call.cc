@@ -40,10 +40,7 @@ std::vector<std::string> BareEnvironment() {
   return bare;
 }
 
-fs::path FolderOfMbverify() {
-  std::error_code error;
-  return fs::read_symlink("/proc/self/exe", error).parent_path();
-}
+fs::path FolderOfMbverify() { return ProgramFile().parent_path(); }
 
 }  // namespace
 

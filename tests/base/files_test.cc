@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <thread>
 
 #include "base/inputs.h"
@@ -168,6 +169,24 @@ TEST_F(FilesTest, ReadByLoadersAreReportedOnceEach) {
   fs::create_symlink("file", folder_ / "other_name");
   EXPECT_EQ(SameFile(folder_ / "other_name", {{"none", ""}, {file_, ""}}), file_);
   EXPECT_EQ(SameFile(folder_ / "new", {{file_, ""}}), "");
+}
+
+TEST_F(FilesTest, AProgramIsFoundByTheNameThatItWasCalledWith) {
+  EXPECT_EQ(ProgramFile(), fs::read_symlink("/proc/self/exe"));
+  const fs::path bin = folder_ / "bin", other = folder_ / "other";
+  for (const fs::path& folder : {other, bin}) {
+    fs::create_directories(folder);
+    ASSERT_EQ(WriteFile(folder / "mbv_tool", "#!/bin/sh\n"), "");
+  }
+  fs::permissions(bin / "mbv_tool", fs::perms::owner_all);
+  const std::string before = std::getenv("PATH") != nullptr ? std::getenv("PATH") : "";
+  // What cannot be run is passed over, as a shell does.
+  setenv("PATH", (other.string() + "::" + bin.string()).c_str(), 1);
+  EXPECT_EQ(ProgramCalled("mbv_tool"), fs::canonical(bin / "mbv_tool"));
+  EXPECT_EQ(ProgramCalled("mbv_no_tool"), fs::path());
+  setenv("PATH", before.c_str(), 1);
+  EXPECT_EQ(ProgramCalled((bin / ".." / "bin" / "mbv_tool").string()),
+            fs::canonical(bin / "mbv_tool"));
 }
 
 }  // namespace

@@ -113,6 +113,25 @@ TEST(AnyFolder, ShippedModelsAndScenariosAreFound) {
   EXPECT_EQ(mbverify.From(mbverify.folder(), "audit spr_tripod").exit_code, 0);
 }
 
+// As after `mbverify init`: names lead to one's own first, then to the shipped ones.
+TEST(AnyFolder, OwnScenariosDoNotHideTheShippedOnes) {
+  const Program mbverify("own_scenarios");
+  const fs::path own = mbverify.folder() / "scenarios" / "four_bar";
+  fs::create_directories(own);
+  std::ofstream(own / "turn.yaml")
+      << "mechanism: four_bar\ndescription: Mine\nanalytic: none\nsimulation: {mode: inverse}\n"
+         "motion: {duration_s: 0.1, commands: {motor: home}}\n";
+  const std::string run = " -q --no-pictures --no-report --out '" + mbverify.Out() + "'";
+  for (const char* name : {"four_bar/turn", "four_bar/static", "slider_crank/static"}) {
+    const ProgramResult result = mbverify.From(mbverify.folder(), "run " + std::string(name) + run);
+    EXPECT_EQ(result.exit_code, 0) << name << result.err;
+  }
+  const std::string list = mbverify.From(mbverify.folder(), "list").out;
+  EXPECT_NE(list.find("Mine"), std::string::npos);
+  EXPECT_EQ(list.find("One turn of the crank, from rest to rest"), std::string::npos);
+  EXPECT_NE(list.find("four_bar/static.yaml"), std::string::npos);
+}
+
 TEST(ModelParameters, AreSetByTheSameWordsInEveryCommand) {
   const Program mbverify("model_set");
   const std::string plain = mbverify("model four_bar --format mjcf --set crank=0.125").out;

@@ -79,7 +79,7 @@ std::optional<MutationOptions> OptionsOf(const MutateArguments& arguments) {
 // What a worker is started with: these arguments, for one part; it writes how far it is.
 std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
                                    const std::string& json, const std::string& progress) {
-  std::vector<std::string> argv = {"/proc/self/exe",
+  std::vector<std::string> argv = {ProgramToStart(),
                                    "sensitivity",
                                    arguments.scenario,
                                    "--size",

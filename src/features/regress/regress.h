@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/files.h"
 #include "base/worker_pool.h"
 #include "features/regress/case_result.h"
 #include "features/regress/find_cases.h"
@@ -36,7 +37,7 @@ struct RegressOptions {
   bool fail_on_missing = false;  ///< exit code 1 if a scenario of an earlier run is gone
   bool partial = false;          ///< merge joins what there is
   /// Program and arguments; "run FILE --out DIR" is added, and the options.
-  std::vector<std::string> worker = {"/proc/self/exe"};
+  std::vector<std::string> worker = {ProgramToStart()};
   /// "{up}" in them is the way from a result's folder to OUT.
   std::vector<std::string> worker_options;
   /// By scenario file: the fingerprint of its programs, which its worker may run.

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <memory>
+#include <set>
+#include <string>
 
 #include "base/json_text.h"
 #include "base/text.h"
@@ -181,26 +183,33 @@ nlohmann::ordered_json ListModels(std::FILE* text) {
   return models;
 }
 
-// Files and heads of all scenarios in ScenariosFolder().
-std::vector<std::pair<std::string, ScenarioHead>> KnownScenarios() {
-  std::vector<std::pair<std::string, ScenarioHead>> scenarios;
-  const auto folder = ScenariosFolder();
-  if (!folder) return scenarios;
-  std::vector<std::string> unread;
-  for (const std::string& file : ExpandYaml(*folder, &unread)) {
-    ScenarioHead head = ReadScenarioHead(file);
-    if (head.is_scenario) scenarios.emplace_back(file, std::move(head));
+struct KnownScenario {
+  std::string name;  ///< that leads to it
+  std::string file, description;
+};
+// All scenarios in ScenarioFolders(); of two with one name that of the first folder.
+std::vector<KnownScenario> KnownScenarios() {
+  std::vector<KnownScenario> scenarios;
+  std::set<std::string> names;
+  for (const fs::path& folder : ScenarioFolders()) {
+    std::vector<std::string> unread;
+    for (const std::string& file : ExpandYaml(folder, &unread)) {
+      const ScenarioHead head = ReadScenarioHead(file);
+      if (!head.is_scenario) continue;
+      std::string name = fs::path(file).lexically_relative(folder).replace_extension().string();
+      if (names.insert(name).second) scenarios.push_back({name, file, head.description});
+    }
   }
   return scenarios;
 }
 
 nlohmann::ordered_json ListScenarios(std::FILE* text) {
   auto scenarios = nlohmann::ordered_json::array();
-  if (ScenariosFolder()) fmt::print(text, "scenarios\n");
-  for (const auto& [file, head] : KnownScenarios()) {
-    Say(text, "  {}\n      {}\n", file,
-        head.description.empty() ? "(no description)" : head.description);
-    scenarios.push_back({{"file", file}, {"description", head.description}});
+  if (!ScenarioFolders().empty()) fmt::print(text, "scenarios\n");
+  for (const KnownScenario& known : KnownScenarios()) {
+    Say(text, "  {}\n      {}\n", known.file,
+        known.description.empty() ? "(no description)" : known.description);
+    scenarios.push_back({{"file", known.file}, {"description", known.description}});
   }
   return scenarios;
 }
@@ -211,10 +220,7 @@ int ListNames(const std::string& kind) {
     for (const std::string& name : ModelNames(".")) fmt::print("{}\n", OneLine(name));
     return 0;
   }
-  for (const auto& [file, head] : KnownScenarios()) {
-    const fs::path name = fs::path(file).lexically_relative(*ScenariosFolder());
-    fmt::print("{}\n", OneLine(fs::path(name).replace_extension().string()));
-  }
+  for (const KnownScenario& known : KnownScenarios()) fmt::print("{}\n", OneLine(known.name));
   return 0;
 }
 
