@@ -2,8 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cmath>
 #include <cstdint>
+#include <initializer_list>
+#include <numbers>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "base/text.h"
 
@@ -259,6 +265,84 @@ std::string TexText(std::string_view given_text) {
     text.remove_prefix(taken);
   }
   return out;
+}
+
+// Numbers of a robot's XML.
+
+namespace {
+
+constexpr int kMeasured = 4;  // digits from which on a number is not taken for exact
+
+// Decimals of a number that was not written as a round one; empty for others and for words.
+std::optional<int> DecimalsOf(std::string_view number) {
+  const size_t e = number.find_first_of("eE");
+  int exponent = 0, decimals = 0, significant = 0;
+  if (e != std::string_view::npos) {
+    const std::string_view power = number.substr(e + 1 + (number.substr(e + 1, 1) == "+" ? 1 : 0));
+    const auto [end, error] = std::from_chars(power.data(), power.data() + power.size(), exponent);
+    if (error != std::errc() || end != power.data() + power.size()) return std::nullopt;
+  }
+  bool after_point = false;
+  for (const char c : number.substr(0, e)) {
+    if (c == '.') {
+      after_point = true;
+    } else if (std::isdigit(static_cast<unsigned char>(c)) != 0) {
+      if (after_point) ++decimals;
+      if (significant > 0 || c != '0') ++significant;
+    } else if (c != '-' && c != '+') {
+      return std::nullopt;
+    }
+  }
+  if (significant < kMeasured) return std::nullopt;
+  return decimals - exponent;
+}
+
+double RoundingOf(std::vector<int>* decimals) {
+  if (decimals->empty()) return 0.0;
+  const auto middle = decimals->begin() + static_cast<std::ptrdiff_t>(decimals->size() / 2);
+  std::nth_element(decimals->begin(), middle, decimals->end());
+  return 0.5 * std::pow(10.0, -*middle);
+}
+
+}  // namespace
+
+PrintedRounding RoundingOf(std::string_view xml) {
+  using Names = std::initializer_list<std::string_view>;
+  const Names positions = {"pos", "xyz", "anchor", "fromto"};
+  const Names directions = {"quat", "rpy", "axis", "xyaxes", "zaxis"};
+  std::vector<int> lengths, turns, angles;
+  bool in_degrees = true;  // `euler`, as MJCF has it
+  for (size_t equals = xml.find('='); equals != std::string_view::npos;
+       equals = xml.find('=', equals + 1)) {
+    size_t last = equals;
+    while (last > 0 && std::isspace(static_cast<unsigned char>(xml[last - 1])) != 0) --last;
+    size_t first = last;
+    while (first > 0 && std::isalnum(static_cast<unsigned char>(xml[first - 1])) != 0) --first;
+    const std::string_view name = xml.substr(first, last - first);
+    const size_t open = xml.find_first_of("\"'", equals);
+    const size_t close = open == std::string_view::npos ? open : xml.find(xml[open], open + 1);
+    if (close == std::string_view::npos) break;
+    const std::string_view value = xml.substr(open + 1, close - open - 1);
+    const auto is_of = [name](const Names& names) {
+      return std::find(names.begin(), names.end(), name) != names.end();
+    };
+    if (name == "angle") in_degrees = value != "radian";
+    std::vector<int>* decimals = is_of(positions)    ? &lengths
+                                 : is_of(directions) ? &turns
+                                 : name == "euler"   ? &angles
+                                                     : nullptr;
+    equals = close;
+    if (decimals == nullptr) continue;
+    for (size_t at = 0; at < value.size();) {
+      const size_t end = std::min(value.find_first_of(" \t\r\n", at), value.size());
+      if (const auto d = DecimalsOf(value.substr(at, end - at))) decimals->push_back(*d);
+      at = end + 1;
+    }
+  }
+  const double degree = std::numbers::pi / 180.0;
+  return {
+      .length = RoundingOf(&lengths),
+      .direction = std::max(RoundingOf(&turns), (in_degrees ? degree : 1.0) * RoundingOf(&angles))};
 }
 
 }  // namespace mbv

@@ -5,23 +5,46 @@
 
 #include "base/demand.h"
 #include "base/json_text.h"
+#include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
+#include "model_file/load_model.h"
 #include "verify/version.h"
 
 namespace mbv {
 
-void AddAssemblyOption(CLI::App* command, std::vector<std::string>* texts) {
+void AddToleranceOption(CLI::App* command, double* tolerance_m) {
   command
-      ->add_option("--assembly", *texts,
+      ->add_option("--closure-tolerance", *tolerance_m,
+                   "gap [m] up to which overconstrained loops of a robot count as rounded and are "
+                   "closed by moving joint frames; by default what the digits of its file explain; "
+                   "0: none")
+      ->check(CLI::NonNegativeNumber);
+}
+
+void AddRobotOptions(CLI::App* command, RobotArguments* arguments) {
+  command
+      ->add_option("--assembly", arguments->assembly,
                    "CLOSURE=N: takes the N-th of the ways to close the loops of this closure that "
                    "are reported (repeatable)")
       ->allow_extra_args(false);
+  command->add_option("--base", arguments->base,
+                      "body or link of a robot that is held; by default its root, where joints or "
+                      "loops do not hold it in the world");
+  AddToleranceOption(command, &arguments->closure_tolerance_m);
 }
 
-bool ReadAssembly(const std::vector<std::string>& texts, std::map<std::string, int>* assembly) {
+int RefuseRobotOptions() {
+  return Refuse("--assembly, --base and --closure-tolerance are for robots (.urdf, .xml)",
+                "a model file says it itself: guesses of the joints, what is fixed to the world, "
+                "closure_tolerance");
+}
+
+bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options) {
+  options->base = arguments.base;
+  options->closure_tolerance_m = arguments.closure_tolerance_m;
   bool good = true;
-  for (const std::string& text : texts) {
+  for (const std::string& text : arguments.assembly) {
     const size_t at = text.rfind('=');
     const std::string number = at == std::string::npos ? "" : text.substr(at + 1);
     int n = 0;
@@ -31,7 +54,7 @@ bool ReadAssembly(const std::vector<std::string>& texts, std::map<std::string, i
       good = false;
       continue;
     }
-    (*assembly)[text.substr(0, at)] = n;
+    options->assembly[text.substr(0, at)] = n;
   }
   return good;
 }

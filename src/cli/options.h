@@ -1,23 +1,39 @@
-// --assembly CLOSURE=N of commands that load robots.
+// Options of commands that load robots.
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "base/diagnostics.h"
 #include "base/inputs.h"
+#include "base/types.h"
 
 namespace mbv {
 
-void AddAssemblyOption(CLI::App* command, std::vector<std::string>* texts);
+struct LoadOptions;  // model_file/load_model.h
 
-/// False after a message: not CLOSURE=N, N from 1.
-[[nodiscard]] bool ReadAssembly(const std::vector<std::string>& texts,
-                                std::map<std::string, int>* assembly);
+/// What a robot's file leaves open.
+struct RobotArguments {
+  std::vector<std::string> assembly;  ///< CLOSURE=N
+  std::string base;                   ///< the body or link that is held
+  double closure_tolerance_m = kNan;  ///< NaN: what the digits of the file explain
+
+  [[nodiscard]] bool any() const {
+    return !assembly.empty() || !base.empty() || std::isfinite(closure_tolerance_m);
+  }
+};
+void AddRobotOptions(CLI::App* command, RobotArguments* arguments);
+/// The exit code after the message that they are for robots only.
+[[nodiscard]] int RefuseRobotOptions();
+/// --closure-tolerance alone.
+void AddToleranceOption(CLI::App* command, double* tolerance_m);
+
+/// False after a message: --assembly is not CLOSURE=N, N from 1.
+[[nodiscard]] bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options);
 
 // --json of the commands that print a result: the same for programs.
 

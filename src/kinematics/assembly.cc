@@ -22,36 +22,14 @@ namespace {
 
 using internal::TreeMotion;
 
-// A group as a mechanism of its own, its innermost body as the world.
 struct PartOfTree {
   Mechanism mechanism;
   double length = 1.0;
 };
 
 PartOfTree Extract(const Mechanism& whole, const LoopGroup& group) {
-  PartOfTree part;
-  Mechanism& m = part.mechanism;
-  std::map<int, int> index;  // of bodies
-  const auto add = [&](int body) {
-    if (!index.emplace(body, static_cast<int>(m.bodies.size())).second) return;
-    m.bodies.push_back(whole.bodies[body]);
-  };
-  std::vector<bool> reversed;
-  for (const int j : group.joints) {
-    const auto at = std::find(whole.tree_joints.begin(), whole.tree_joints.end(), j);
-    const auto t = static_cast<size_t>(at - whole.tree_joints.begin());
-    add(InboardBody(whole, t));  // the first one becomes the world
-    add(OutboardBody(whole, t));
-    m.tree_joints.push_back(static_cast<int>(m.joints.size()));
-    m.tree_reversed.push_back(whole.tree_reversed[t]);
-    m.joints.push_back(whole.joints[j]);
-  }
-  for (const int j : group.closures) m.joints.push_back(whole.joints[j]);
-  for (Joint& joint : m.joints) {
-    joint.parent = index.at(joint.parent);
-    joint.child = index.at(joint.child);
-  }
-  part.length = CharacteristicLength(m);
+  PartOfTree part{.mechanism = GroupAlone(whole, group)};
+  part.length = CharacteristicLength(part.mechanism);
   return part;
 }
 
@@ -271,6 +249,34 @@ class AssemblySearch {
 };
 
 }  // namespace
+
+Mechanism GroupAlone(const Mechanism& whole, const LoopGroup& group) {
+  Mechanism m;
+  std::map<int, int> index;  // of bodies
+  const bool at_home = !whole.X_WB_home.empty();
+  Pose X_OW = Pose::Identity();  // of the world in the innermost body
+  const auto add = [&](int body) {
+    if (!index.emplace(body, static_cast<int>(m.bodies.size())).second) return;
+    if (at_home && m.bodies.empty()) X_OW = whole.X_WB_home[body].inverse();
+    m.bodies.push_back(whole.bodies[body]);
+    if (at_home) m.X_WB_home.push_back(X_OW * whole.X_WB_home[body]);
+  };
+  for (const int j : group.joints) {
+    const auto at = std::find(whole.tree_joints.begin(), whole.tree_joints.end(), j);
+    const auto t = static_cast<size_t>(at - whole.tree_joints.begin());
+    add(InboardBody(whole, t));  // the first one becomes the world
+    add(OutboardBody(whole, t));
+    m.tree_joints.push_back(static_cast<int>(m.joints.size()));
+    m.tree_reversed.push_back(whole.tree_reversed[t]);
+    m.joints.push_back(whole.joints[j]);
+  }
+  for (const int j : group.closures) m.joints.push_back(whole.joints[j]);
+  for (Joint& joint : m.joints) {
+    joint.parent = index.at(joint.parent);
+    joint.child = index.at(joint.child);
+  }
+  return m;
+}
 
 GroupAssemblies FindAssemblies(const Mechanism& mechanism, const LoopGroup& group,
                                const std::vector<bool>& driven, const JointCoordinates& guess) {

@@ -33,6 +33,10 @@ struct GroupAssemblies {
   int starts = 0;                    ///< tried
 };
 
+/// A group as a mechanism of its own, its innermost body as the world: the group's tree joints,
+/// then its closures; at home where the whole is. Drives, couplings and elements stay behind.
+[[nodiscard]] Mechanism GroupAlone(const Mechanism& whole, const LoopGroup& group);
+
 /// Searches the ways to close one group near `guess` (by joint index of the mechanism): from the
 /// guesses, then from a fixed sequence of random starts around them, farther and farther away.
 /// First with driven joints held, and if that does not close, with them free.

@@ -526,6 +526,7 @@ Diagnostics WithoutPlaces(const Diagnostics& diagnostics) {
 struct Reading {
   const LoadOptions& options;
   bool bare_urdf = false;  // the text stands for a URDF file
+  PrintedRounding printed;
   YamlReader yaml;
   Diagnostics others;  // findings of other files: overrides, URDF, parameters
   internal::Literals literals;
@@ -659,7 +660,7 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   each_block([&](const Block& block) { joints.Read(block); });
   ReadSignals(each_block, names, &values, &s);
   ReadElastic(each_block, names, &values, &s);
-  urdf.WeldRoot(s.urdf.root, s.bodies, &s.joints);
+  urdf.HoldBase(s.urdf.root, reading->options.base, s.bodies, &s.joints);
   internal::OrderDrives(root, &yaml, &s.drives);
   internal::ReadSymbols(root, &yaml, &s.drives);
   ReadMotors(blocks.model(), &yaml, &s);
@@ -708,11 +709,15 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
   // number, those about the loops.
   if (!s.joints.good || !internal::CheckTree(s.joints.hints, mechanism, &report)) return;
   if (report.has_errors()) return;
-  internal::CloseLoops({.tolerance_m = s.head.closure_tolerance_m,
-                        .bare_urdf = reading->bare_urdf,
-                        .assembly = reading->options.assembly,
-                        .guessed = s.joints.guessed},
-                       mechanism, &report);
+  const double by_option_m = reading->options.closure_tolerance_m;
+  internal::CloseLoops(
+      {.tolerance_m = std::isfinite(by_option_m) ? by_option_m : s.head.closure_tolerance_m,
+       .printed = std::isfinite(by_option_m) ? PrintedRounding{} : reading->printed,
+       .bare_urdf = reading->bare_urdf,
+       .is_robot = !reading->yaml.file().ends_with(".yaml"),
+       .assembly = reading->options.assembly,
+       .guessed = s.joints.guessed},
+      mechanism, &report);
   if (report.has_own_errors()) return;
   internal::CheckHome(*mechanism, &report);
   internal::CheckIsostaticRule(*mechanism, &report);
@@ -731,6 +736,7 @@ Diagnostics FindingsOf(const Reading& reading) {
 Reading ReadingOf(const std::string& file, const LoadOptions& options) {
   return {.options = options,
           .bare_urdf = internal::IsUrdfFile(file),
+          .printed = options.printed,
           .yaml = YamlReader(file),
           .others = {},
           .literals = internal::Literals(options.literals),
@@ -764,7 +770,9 @@ LoadResult LoadFrom(const std::string& text, Reading reading) {
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,
                          const LoadOptions& options) {
-  return LoadFrom(ModelFileText(text, file), ReadingOf(file, options));
+  Reading reading = ReadingOf(file, options);
+  if (reading.bare_urdf) reading.printed = RoundingOf(text);
+  return LoadFrom(ModelFileText(text, file), std::move(reading));
 }
 
 LoadedBodies LoadBodiesText(const std::string& text, const std::string& file) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/diagnostics.h"
+#include "base/markup.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -27,6 +28,14 @@ struct LoadOptions {
   /// Which way to close the loops is meant (kinematics/home.h), by the name of a closure; counted
   /// from 1 in the order in which they are reported.
   std::map<std::string, int> assembly = {};
+  /// The body or link of a robot that is held in the pose of its file; "": what hangs together is
+  /// held at its root, where nothing ties it to the world. No model file has one.
+  std::string base = {};
+  /// Gap up to which rounded loops are closed [m], instead of what a model file states or the
+  /// digits of a robot's file explain.
+  double closure_tolerance_m = kNan;
+  /// Of the robot's file that the text stands for; of a URDF file its own.
+  PrintedRounding printed = {};
   /// Other values of literals, by place.
   std::map<std::string, double> literals;
 };

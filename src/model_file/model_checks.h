@@ -34,6 +34,11 @@ class ModelReport {
               std::vector<ModelCaveat>* caveats)
       : places_(places), yaml_(*yaml), others_(*others), caveats_(*caveats) {}
 
+  /// What a robot's file has and the mechanism has not: as Allow().
+  [[nodiscard]] std::string LeaveOut(const std::string& text) {
+    caveats_.push_back({.kind = ModelCaveat::Kind::kLeftOut, .text = text, .source = "rounding"});
+    return text;
+  }
   /// What the model makes acceptable; the warning that says it, and a caveat of every verdict.
   [[nodiscard]] std::string Allow(const std::string& text) {
     caveats_.push_back({.kind = ModelCaveat::Kind::kAllowed, .text = text});
@@ -79,8 +84,10 @@ bool CheckTree(const ClosureHints& hints, Mechanism* mechanism, ModelReport* rep
 
 /// How loops may be closed that their data leave open.
 struct ClosureRules {
-  double tolerance_m = 0.0;      ///< up to which rounded data are projected
+  double tolerance_m = 0.0;      ///< up to which rounded data are projected, or …
+  PrintedRounding printed = {};  ///< … as far as the digits of a robot's file explain
   bool bare_urdf = false;        ///< no model file: joints named as balls are taken for such
+  bool is_robot = false;         ///< of a foreign format: options say what a model file would
   AssemblyChoice assembly = {};  ///< by option
   std::set<int> guessed = {};    ///< joints with a stated guess
 };

@@ -43,11 +43,20 @@ using internal::TreeMotion;
 constexpr double kGapFactor = 30.0;
 // Larger gaps [L, rad] are no rounding.
 constexpr double kLargestGap = 3e-3;
-constexpr double kLeastDamping = 1e-12;  // over the residual
 // A paradoxical loop that closes in too few poses, or in a short arc, is open by a ten thousandth
 // of the rounding elsewhere, and its reactions are then noise.
 constexpr Eigen::Index kPoses = 24, kFewestPoses = 12;
-constexpr double kReach = 2.4;  // of the poses from home [rad, L]
+constexpr double kReach = 2.4;           // of the poses from home [rad, L]
+constexpr double kLeastDamping = 1e-12;  // over the residual
+
+// How frames are moved. Beyond singular poses rounding adds up without bound: then those nearer
+// home come first. Paradoxical loops need damped steps, which move frames farther than others do.
+struct Way {
+  std::vector<double> reaches;
+  bool damped = false;
+};
+const std::array<Way, 3> kWays = {{{{kReach}}, {{0.6, kReach}}, {{kReach}, true}}};
+
 constexpr Eigen::Index kMostUnknowns = 800;
 
 BodyStates StatesAt(const std::vector<Pose>& X_WB) {
@@ -67,58 +76,84 @@ double RankTolerance(double gap) { return std::max(internal::kRankTolerance, kGa
 
 class Projector {
  public:
-  explicit Projector(const Mechanism& mechanism, double gap)
+  Projector(const Mechanism& mechanism, double gap, double reach, bool damped)
       : mechanism_(mechanism),
         length_(CharacteristicLength(mechanism)),
         tree_(mechanism_, std::vector<bool>(mechanism.joints.size(), false)),
         frames_(static_cast<Eigen::Index>(12 * mechanism.joints.size())),
+        damped_(damped),
         xi_(VecX::Zero(frames_)) {
     unit_.setOnes(tree_.dofs());
     for (int c = 0; c < tree_.dofs(); ++c) {
       if (!tree_.angular()[c]) unit_[c] = length_;
     }
-    MakePoses(gap);
+    MakePoses(gap, reach);
   }
 
   [[nodiscard]] Eigen::Index unknowns() const {
     return frames_ + static_cast<Eigen::Index>(poses_.size()) * tree_.dofs();
   }
 
+  /// False where all poses close with the frames as they are.
+  [[nodiscard]] bool IsRounded() {
+    return Evaluate(poses_, nullptr).lpNorm<Eigen::Infinity>() > kHomeTolerance;
+  }
+
   /// True if all poses close.
   bool Solve() {
     MatX J;
     VecX r = Evaluate(poses_, &J);
-    // Damping that vanishes with the residual keeps the convergence quadratic. Rows that only this
-    // residual makes independent have singular values of the gap's size: more damping than their
-    // squares would hold the steps along them back for good, so each iteration begins far below.
     double mu = kLeastDamping;
     for (int i = 0; i < 60 && r.lpNorm<Eigen::Infinity>() > 1e-15; ++i) {
-      mu = std::max(0.01 * mu, kLeastDamping * r.norm());
-      bool better = false;
-      for (int attempt = 0; attempt < 16 && !better; ++attempt, mu *= better ? 1 : 30) {
-        const VecX s = DampedStep(J, r, mu);
-        const std::vector<std::vector<Pose>> old_poses = poses_;
-        const VecX old_xi = xi_;
-        Apply(s);
-        const VecX next = Evaluate(poses_, nullptr);
-        better = next.norm() < r.norm();
-        if (!better) {
-          poses_ = old_poses;
-          SetFrames(old_xi);
-        }
-      }
-      if (!better) break;
+      if (!(damped_ ? StepDamped(J, r, &mu) : StepWhereClear(J, r))) break;
       r = Evaluate(poses_, &J);
     }
     return r.lpNorm<Eigen::Infinity>() < 1e-12;
   }
 
-  [[nodiscard]] const Mechanism& mechanism() const { return mechanism_; }
-  [[nodiscard]] std::vector<Pose> HomePoses() const { return tree_.States(poses_[0]).X_WB; }
+  /// With the frames moved, in the first of the poses.
+  [[nodiscard]] Mechanism mechanism() const {
+    Mechanism moved = mechanism_;
+    moved.X_WB_home = tree_.States(poses_[0]).X_WB;
+    return moved;
+  }
   [[nodiscard]] double moved_m() const { return length_ * Largest(3); }
   [[nodiscard]] double turned_rad() const { return Largest(0); }
 
  private:
+  // Damping that vanishes with the residual keeps the convergence quadratic. Rows that only this
+  // residual makes independent have singular values of the gap's size: more damping than their
+  // squares would hold the steps along them back for good, so each iteration begins far below.
+  bool StepDamped(const MatX& J, const VecX& r, double* mu) {
+    *mu = std::max(0.01 * *mu, kLeastDamping * r.norm());
+    for (int attempt = 0; attempt < 16; ++attempt, *mu *= 30) {
+      if (Take(DampedStep(J, r, *mu), r.norm())) return true;
+    }
+    return false;
+  }
+  // Along such rows a step is as large as it is arbitrary: here none is taken.
+  bool StepWhereClear(const MatX& J, const VecX& r) {
+    constexpr double kLargestShare = 1e-3;  // of the largest pivot
+    Eigen::CompleteOrthogonalDecomposition<MatX> solver;
+    double share = RankTolerance(r.lpNorm<Eigen::Infinity>());
+    do {
+      solver.setThreshold(share);
+      if (Take(-solver.compute(J).solve(r), r.norm())) return true;
+      share *= kGapFactor;
+    } while (share < kLargestShare);
+    return false;
+  }
+  // Unless nothing gets better by it.
+  bool Take(const VecX& s, double norm) {
+    const std::vector<std::vector<Pose>> old_poses = poses_;
+    const VecX old_xi = xi_;
+    Apply(s);
+    if (Evaluate(poses_, nullptr).norm() < norm) return true;
+    poses_ = old_poses;
+    SetFrames(old_xi);
+    return false;
+  }
+
   [[nodiscard]] double Largest(Eigen::Index first) const {
     double largest = 0.0;
     for (Eigen::Index i = first; i < frames_; i += 6) {
@@ -133,11 +168,35 @@ class Projector {
     return std::clamp(room, kFewestPoses, kPoses);
   }
 
-  void MakePoses(double gap) {
+  // The poses of joints at coordinates, closed as far as the frames as given allow.
+  std::vector<Pose> Closed(const std::vector<std::array<double, 6>>& q, double gap) const {
+    std::vector<Pose> X_FM;
+    for (size_t j = 0; j < q.size(); ++j) X_FM.push_back(JointPose(mechanism_.joints[j], q[j]));
+    CloseAsGiven(gap, &X_FM);
+    return X_FM;
+  }
+  [[nodiscard]] bool IsOpen(const std::vector<Pose>& X_FM, double gap) const {
+    return !(At(X_FM, nullptr).lpNorm<Eigen::Infinity>() <= kGapFactor * gap);
+  }
+
+  // The guesses, if they close but for rounding; else home, which may lie where rounded loops
+  // happen to close.
+  void Begin(double gap) {
+    std::vector<std::array<double, 6>> guess, home;
     for (const Joint& joint : mechanism_.joints) {
       given_.push_back(joint.X_PF);
       given_.push_back(joint.X_CM);
+      guess.push_back(joint.guess);
+      home.push_back(joint.home);
     }
+    std::vector<Pose> X_FM = Closed(guess, gap);
+    if (IsOpen(X_FM, gap)) X_FM = Closed(home, gap);
+    mechanism_.X_WB_home = tree_.States(X_FM).X_WB;
+    poses_.push_back(std::move(X_FM));
+  }
+
+  void MakePoses(double gap, double reach) {
+    Begin(gap);
     const MatX motion = internal::FindRank(ScaledRows(mechanism_), internal::NullSpaces::kMotion,
                                            RankTolerance(gap))
                             .motion;
@@ -145,15 +204,14 @@ class Projector {
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     std::vector<std::array<double, 6>> near;
     for (const Joint& joint : mechanism_.joints) near.push_back(joint.home);
+    near = JointCoordinatesAt(mechanism_, mechanism_.X_WB_home, near);
     const Eigen::Index poses = motion.cols() == 0 ? 1 : Poses();
-    for (Eigen::Index k = 0; k < poses; ++k) {
+    for (Eigen::Index k = 1; k < poses; ++k) {
       VecX dx = VecX::Zero(motion.rows());
-      for (Eigen::Index c = 0; c < motion.cols() && k > 0; ++c) {
-        dx += uniform(random) * motion.col(c);
-      }
+      for (Eigen::Index c = 0; c < motion.cols(); ++c) dx += uniform(random) * motion.col(c);
       // Spread over both directions of a single DOF, too.
       const double amplitude =
-          kReach * (2.0 * static_cast<double>(k) / static_cast<double>(poses) - 1.0);
+          reach * (2.0 * static_cast<double>(k) / static_cast<double>(poses) - 1.0);
       if (const double size = dx.lpNorm<Eigen::Infinity>(); size > 0.0) dx *= amplitude / size;
       std::vector<Pose> X_WB = mechanism_.X_WB_home;
       for (size_t b = 1; b < X_WB.size(); ++b) {
@@ -161,28 +219,29 @@ class Projector {
         X_WB[b].linear() = ExpRotation(twist.head<3>()) * X_WB[b].linear();
         X_WB[b].translation() += length_ * twist.tail<3>();
       }
-      const auto q = JointCoordinatesAt(mechanism_, X_WB, near);
-      std::vector<Pose>& X_FM = poses_.emplace_back();
-      for (size_t j = 0; j < q.size(); ++j) {
-        X_FM.push_back(JointPose(mechanism_.joints[j], q[j]));
-      }
-      CloseAsGiven(&X_FM);
+      std::vector<Pose> X_FM = Closed(JointCoordinatesAt(mechanism_, X_WB, near), gap);
       // Beyond the range of the motion: no rounding.
-      if (k > 0 && At(X_FM, nullptr).lpNorm<Eigen::Infinity>() > kGapFactor * gap) {
-        poses_.pop_back();
-      }
+      if (!IsOpen(X_FM, gap)) poses_.push_back(std::move(X_FM));
     }
   }
 
-  // As well as the frames as given allow: what is left then is the rounding.
-  void CloseAsGiven(std::vector<Pose>* X_FM) const {
+  // As well as the frames as given allow: what is left then is the rounding. Where nothing but
+  // rounding is left, no step is taken along motions that it alone hinders: they would end where
+  // rounded loops happen to close.
+  void CloseAsGiven(double gap, std::vector<Pose>* X_FM) const {
+    Eigen::CompleteOrthogonalDecomposition<MatX> solver;
+    solver.setThreshold(RankTolerance(gap));
     MatX J;
     VecX r = At(*X_FM, &J);
     for (int i = 0; i < 50; ++i) {
       const double before = r.norm();
+      const bool near = r.lpNorm<Eigen::Infinity>() <= kGapFactor * gap;
       double mu = std::max(r.squaredNorm(), 1e-26);
-      for (int attempt = 0; attempt < 12 && !(r.norm() < before); ++attempt, mu *= 30) {
-        const VecX s = DampedStep(J * unit_.asDiagonal(), r, mu);
+      for (int attempt = 0; attempt < (near ? 1 : 12) && !(r.norm() < before);
+           ++attempt, mu *= 30) {
+        const MatX J_scaled = J * unit_.asDiagonal();
+        const VecX s =
+            near ? VecX(-solver.compute(J_scaled).solve(r)) : DampedStep(J_scaled, r, mu);
         std::vector<Pose> next = *X_FM;
         tree_.Step(unit_.cwiseProduct(s), &next);
         MatX J_next;
@@ -223,7 +282,10 @@ class Projector {
 
   // Residuals of all poses; derivatives by the frames from central differences.
   VecX Evaluate(const std::vector<std::vector<Pose>>& poses, MatX* J) {
-    constexpr double kStep = 1e-6;
+    // Central differences of fourth order: rounding and what they leave out are both some 1e-13.
+    constexpr double kStep = 1e-3;
+    constexpr std::array<std::pair<double, double>, 4> kStencil = {
+        {{2, -1.0 / 12}, {1, 8.0 / 12}, {-1, -8.0 / 12}, {-2, 1.0 / 12}}};
     const Eigen::Index rows = At(poses[0], nullptr).size(), n = tree_.dofs();
     const auto count = static_cast<Eigen::Index>(poses.size());
     VecX r(rows * count);
@@ -236,12 +298,12 @@ class Projector {
     if (J == nullptr) return r;
     for (Eigen::Index c = 0; c < frames_; ++c) {
       Vec6 xi = xi_.segment<6>(6 * (c / 6));
-      for (const double step : {kStep, -kStep}) {
+      for (const auto& [steps, weight] : kStencil) {
         Vec6 perturbed = xi;
-        perturbed[c % 6] += step;
+        perturbed[c % 6] += steps * kStep;
         MoveFrame(static_cast<size_t>(c / 6), perturbed);
         for (Eigen::Index k = 0; k < count; ++k) {
-          J->block(k * rows, c, rows, 1) += At(poses[k], nullptr) / (2 * step);
+          J->block(k * rows, c, rows, 1) += weight / kStep * At(poses[k], nullptr);
         }
       }
       MoveFrame(static_cast<size_t>(c / 6), xi);
@@ -253,6 +315,7 @@ class Projector {
   const double length_;
   const TreeMotion tree_;
   const Eigen::Index frames_;
+  const bool damped_;
   VecX xi_, unit_;
   std::vector<Pose> given_;               // X_PF, X_CM of each joint
   std::vector<std::vector<Pose>> poses_;  // X_FM per joint
@@ -269,28 +332,56 @@ int CountNearlyRedundant(const Mechanism& mechanism, double gap) {
   return static_cast<int>(J.rows()) - rank;
 }
 
-// Moves the joint frames X_PF, X_CM of a mechanism whose home solution left `gap`.
-DataProjection ProjectData(Mechanism* mechanism, double gap) {
+// Moves the joint frames X_PF, X_CM of the loops that `gap` [characteristic lengths, rad] may keep
+// from moving, each group by itself.
+DataProjection ProjectData(Mechanism* mechanism, double gap, const Way& way) {
   DataProjection projection;
   projection.redundant = CountNearlyRedundant(*mechanism, gap);
   if (projection.redundant == 0) return projection;
-  Projector projector(*mechanism, gap);
-  if (projector.unknowns() > kMostUnknowns || !projector.Solve()) return projection;
-  Mechanism projected = projector.mechanism();
+  const double length_m = CharacteristicLength(*mechanism);
+  Mechanism projected = *mechanism;
+  projection.moved_m = projection.turned_rad = 0.0;
+  for (const LoopGroup& group : LoopGroups(*mechanism)) {
+    const Mechanism part = GroupAlone(*mechanism, group);
+    const double part_gap = gap * std::max(1.0, length_m / CharacteristicLength(part));
+    if (CountNearlyRedundant(part, part_gap) == 0) continue;
+    double moved_m = 0.0, turned_rad = 0.0;
+    Mechanism moved = part;
+    for (const double reach : way.reaches) {
+      Projector projector(moved, part_gap, reach, way.damped);
+      if (projector.unknowns() > kMostUnknowns) return projection;
+      if (!projector.IsRounded()) break;
+      if (!projector.Solve()) return projection;
+      moved_m += projector.moved_m();
+      turned_rad += projector.turned_rad();
+      moved = projector.mechanism();
+    }
+    if (moved_m == 0.0 && turned_rad == 0.0) continue;
+    projection.moved_m = std::max(projection.moved_m, moved_m);
+    projection.turned_rad = std::max(projection.turned_rad, turned_rad);
+    std::vector<int> joints = group.joints;
+    joints.insert(joints.end(), group.closures.begin(), group.closures.end());
+    std::vector<std::array<double, 6>> near;
+    for (const Joint& joint : part.joints) near.push_back(joint.guess);
+    const auto home = JointCoordinatesAt(moved, moved.X_WB_home, near);
+    for (size_t k = 0; k < joints.size(); ++k) {
+      Joint& joint = projected.joints[static_cast<size_t>(joints[k])];
+      joint.X_PF = moved.joints[k].X_PF;
+      joint.X_CM = moved.joints[k].X_CM;
+      joint.guess = home[k];
+    }
+  }
+  if (projection.moved_m == 0.0 && projection.turned_rad == 0.0) return projection;
   // Home is where it closes now; the guesses stay as they are.
-  std::vector<std::array<double, 6>> near;
-  for (const Joint& joint : mechanism->joints) near.push_back(joint.guess);
-  const auto home = JointCoordinatesAt(projected, projector.HomePoses(), near);
-  for (size_t j = 0; j < home.size(); ++j) projected.joints[j].guess = home[j];
   const bool closed = SolveHome(&projected).closed;
-  for (size_t j = 0; j < home.size(); ++j) projected.joints[j].guess = near[j];
+  for (size_t j = 0; j < projected.joints.size(); ++j) {
+    projected.joints[j].guess = mechanism->joints[j].guess;
+  }
   if (!closed) return projection;
   // What was redundant but for the gap must be so now.
   if (AnalyseMobility(projected).redundant != projection.redundant) return projection;
   *mechanism = std::move(projected);
   projection.closed = true;
-  projection.moved_m = projector.moved_m();
-  projection.turned_rad = projector.turned_rad();
   return projection;
 }
 
@@ -305,21 +396,49 @@ constexpr double kProjectionReach = 10.0;
 // characteristic lengths].
 constexpr double kMovedDrive = 1e-3;
 
-bool ProjectRoundedData(const ClosureRules& rules, const HomeResult& home, Mechanism* mechanism,
-                        ModelReport* report) {
-  const DataProjection projection = ProjectData(mechanism, home.gap);
-  if (!projection.closed) return false;
-  const double moved_m =
-      std::max(projection.moved_m, projection.turned_rad * CharacteristicLength(*mechanism));
-  if (moved_m > kProjectionReach * rules.tolerance_m) return false;
-  const std::string text = report->Allow(
-      fmt::format("joint frames moved by up to {:.2g} m and {:.2g} rad, because the loops are "
-                  "overconstrained "
-                  "by {} and their data close them except for {:.2g} m (closure_tolerance {:g} m)",
-                  projection.moved_m, projection.turned_rad, projection.redundant,
-                  home.gap * CharacteristicLength(*mechanism), rules.tolerance_m));
-  report->AtFile(Severity::kWarning, text);
-  return true;
+// Moves joint frames where that takes no more than rounding; `why` is what it says then.
+bool Project(const ClosureRules& rules, double gap, const std::string& why, Mechanism* mechanism,
+             ModelReport* report) {
+  const double length_m = CharacteristicLength(*mechanism);
+  for (const Way& way : kWays) {
+    Mechanism projected = *mechanism;
+    const DataProjection projection = ProjectData(&projected, gap, way);
+    const double moved_m = std::max(projection.moved_m, projection.turned_rad * length_m);
+    if (!projection.closed || moved_m > kProjectionReach * rules.tolerance_m) continue;
+    *mechanism = std::move(projected);
+    const std::string text = fmt::format(
+        "joint frames moved by up to {:.2g} m and {:.2g} rad, because the loops are "
+        "overconstrained by {} and {}",
+        projection.moved_m, projection.turned_rad, projection.redundant, why);
+    const std::string tolerance = fmt::format("{:.2g} m", rules.tolerance_m);
+    report->AtFile(
+        Severity::kWarning,
+        rules.is_robot
+            ? report->LeaveOut(fmt::format(
+                  "rounding of the file's numbers: {} ({} {})", text,
+                  rules.printed.explains() ? "their digits explain" : "--closure-tolerance",
+                  tolerance))
+            : report->Allow(fmt::format("{} (closure_tolerance {})", text, tolerance)));
+    return true;
+  }
+  return false;
+}
+
+// Rounded loops may close at home and yet not move. How much of a tolerance the rounding takes is
+// not known: less of it leaves more rows independent.
+void ProjectLoopsThatCannotMove(const ClosureRules& rules, Mechanism* mechanism,
+                                ModelReport* report) {
+  constexpr int kTries = 4;
+  double gap = rules.tolerance_m / CharacteristicLength(*mechanism);
+  int tried = 0;  // constraints that were redundant
+  for (int i = 0; i < kTries && gap > kHomeTolerance; ++i, gap /= kGapFactor) {
+    const int redundant = CountNearlyRedundant(*mechanism, gap);
+    if (redundant == tried) continue;
+    tried = redundant;
+    if (Project(rules, gap, "their data let them move except for rounding", mechanism, report)) {
+      return;
+    }
+  }
 }
 
 void ReportGaps(const ClosureRules& rules, const Mechanism& mechanism, const HomeResult& home,
@@ -487,11 +606,47 @@ void ReportUnmet(const Mechanism& mechanism, const HomeResult& home, ModelReport
 
 }  // namespace
 
-void CloseLoops(const ClosureRules& rules, Mechanism* mechanism, ModelReport* report) {
+namespace {
+
+// The gap [m] to which rounding of each joint's frames may add up along the longest loop.
+double ExplainedGap(const PrintedRounding& printed, const Mechanism& mechanism) {
+  std::vector<int> above(mechanism.bodies.size(), 0);  // the inboard body
+  for (size_t i = 0; i < mechanism.tree_joints.size(); ++i) {
+    const Joint& joint = mechanism.joints[static_cast<size_t>(mechanism.tree_joints[i])];
+    const bool reversed = mechanism.tree_reversed[i];
+    above[static_cast<size_t>(reversed ? joint.parent : joint.child)] =
+        reversed ? joint.child : joint.parent;
+  }
+  const auto path = [&above](int body) {
+    std::vector<int> bodies;
+    for (; body != 0; body = above[static_cast<size_t>(body)]) bodies.push_back(body);
+    return bodies;
+  };
+  size_t longest = 0;
+  for (const Joint& joint : mechanism.joints) {
+    if (!joint.closure) continue;
+    std::vector<int> a = path(joint.parent), b = path(joint.child);
+    while (!a.empty() && !b.empty() && a.back() == b.back()) {
+      a.pop_back();
+      b.pop_back();
+    }
+    longest = std::max(longest, a.size() + b.size() + 1);
+  }
+  // Three components of a position; a quaternion's error turns by twice as much.
+  return static_cast<double>(longest) * (std::sqrt(3.0) * printed.length +
+                                         2.0 * printed.direction * CharacteristicLength(mechanism));
+}
+
+}  // namespace
+
+void CloseLoops(const ClosureRules& given, Mechanism* mechanism, ModelReport* report) {
+  ClosureRules rules = given;
+  rules.tolerance_m = std::max(rules.tolerance_m, ExplainedGap(rules.printed, *mechanism));
   GuessFollowers(rules.guessed, mechanism);
   const HomeResult home = SolveHome(mechanism, rules.assembly);
   if (!home.unmet.empty()) return ReportUnmet(*mechanism, home, report);
   if (home.closed) {
+    ProjectLoopsThatCannotMove(rules, mechanism, report);
     if (home.guesses_moved) {
       WarnAboutAssembly(*mechanism, home, report);
     } else if (home.drives_moved) {
@@ -502,7 +657,8 @@ void CloseLoops(const ClosureRules& rules, Mechanism* mechanism, ModelReport* re
   const double gap_m = home.gap * CharacteristicLength(*mechanism);
   const int redundant = CountNearlyRedundant(*mechanism, home.gap);
   if (redundant > 0 && gap_m <= rules.tolerance_m &&
-      ProjectRoundedData(rules, home, mechanism, report)) {
+      Project(rules, home.gap, fmt::format("their data close them except for {:.2g} m", gap_m),
+              mechanism, report)) {
     return;
   }
   if (rules.bare_urdf && TakeNamedBalls(mechanism, report)) return;
@@ -511,9 +667,10 @@ void CloseLoops(const ClosureRules& rules, Mechanism* mechanism, ModelReport* re
   if (redundant > 0) {
     hint = fmt::format(
         "the loops are overconstrained by {} and closed except for {:.2g} m: rounded data? More "
-        "digits close them; `closure_tolerance: {:.0e}` in the model moves the joint frames by as "
-        "little as closes them",
-        redundant, gap_m, 2 * gap_m);
+        "digits close them; {}{:.0e}{} moves the joint frames by as little as closes them",
+        redundant, gap_m,
+        rules.is_robot ? "--closure-tolerance " : "`closure_tolerance: ", 2 * gap_m,
+        rules.is_robot ? "" : "` in the model");
   }
   CheckAxes(*mechanism, false, report);
   ReportGaps(rules, *mechanism, home, hint, report);

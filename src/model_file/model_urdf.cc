@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,6 +12,7 @@
 #include "base/diagnostics.h"
 #include "base/text.h"
 #include "math/spatial.h"
+#include "mechanism/joint_pose.h"
 #include "model_file/urdf/urdf_import.h"
 
 namespace mbv::internal {
@@ -460,18 +462,55 @@ void UrdfReader::AddExtras(const UrdfTree& tree, const Into& into) {
   }
 }
 
-void UrdfReader::WeldRoot(int root, const ModelBodies& bodies, ModelJoints* joints) {
+void UrdfReader::HoldBase(int root, const std::string& base, const ModelBodies& bodies,
+                          ModelJoints* joints) {
   if (root < 0) return;
+  const auto name_of = [&](int body) { return bodies.bodies[static_cast<size_t>(body)].name; };
+  const auto refuse = [&](const std::string& text, const std::string& hint) {
+    others_.Add({Severity::kError, values_.yaml().file(), 0, 0, text, hint});
+  };
+  bool floats = true;  // nothing ties the root to the world
   for (const Joint& joint : joints->joints) {
-    if (joint.child == root || (joint.parent == root && joint.child == 0)) return;
+    floats = floats && joint.child != root && !(joint.parent == root && joint.child == 0);
   }
-  const std::string& name = bodies.bodies[root].name;
+  int held = root;
+  Pose X_WB = Pose::Identity();  // of `held`, with the joints at their guesses
+  if (bare_ && !base.empty()) {
+    std::map<std::string, int> links;
+    for (const auto& [link, place] : bodies.links) links[link] = place.body;
+    for (size_t k = 1; k < bodies.bodies.size(); ++k) {
+      links[bodies.bodies[k].name] = static_cast<int>(k);
+    }
+    const auto found = links.find(base);
+    if (found == links.end() || found->second == 0) {
+      std::vector<std::string> names;
+      names.reserve(links.size());
+      for (const auto& [link, body] : links) names.push_back(link);
+      refuse(fmt::format("base {}: there is no link of this name", base), DidYouMean(base, names));
+    } else if (!floats) {
+      refuse(fmt::format("base {}: the root link '{}' is tied to the world", base, name_of(root)),
+             "only a robot that nothing ties to the world needs a base");
+    } else {
+      held = found->second;
+    }
+    for (int b = held; b != root;) {
+      const auto above = std::ranges::find_if(
+          joints->joints, [b](const Joint& joint) { return joint.child == b && !joint.closure; });
+      if (above == joints->joints.end()) break;  // a finding of the tree
+      X_WB = above->X_PF * JointPose(*above, above->guess) * above->X_CM.inverse() * X_WB;
+      b = above->parent;
+    }
+  }
+  if (!floats) return;
   Joint weld;
-  weld.name = name + ".weld";
-  weld.child = root;
+  weld.name = name_of(held) + ".weld";
+  weld.child = held;
+  weld.X_PF = X_WB;
   if (bare_) {
     others_.Add({Severity::kWarning, values_.yaml().file(), 0, 0,
-                 fmt::format("the root link '{}' is held: it is fixed to the world", name), ""});
+                 fmt::format("the {} '{}' is held: it is fixed to the world",
+                             held == root ? "root link" : "link", name_of(held)),
+                 held == root ? "--base LINK holds another one" : ""});
   }
   joints->Add(std::move(weld), {}, std::nullopt);
 }

@@ -44,8 +44,9 @@ class UrdfReader {
   };
   UrdfSection Read(const Block& model, const YamlNode& node, const Into& into);
 
-  /// Fixes the root link to the world unless a joint of the model file carries it.
-  void WeldRoot(int root, const ModelBodies& bodies, ModelJoints* joints);
+  /// Fixes the root link, or of a bare URDF the link `base` where joints at their guesses have it,
+  /// to the world, unless a joint of the model file carries the root.
+  void HoldBase(int root, const std::string& base, const ModelBodies& bodies, ModelJoints* joints);
 
  private:
   /// The tree as the file and the closure file have it, links that are frames folded.

@@ -29,45 +29,48 @@ struct ModelAnswer {
   std::vector<Finding> findings;
   std::string model;  // "" after errors
   std::vector<ModelCaveat> left_out;
+  PrintedRounding printed;
 };
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<ModelAnswer>& answer) {
   visit(answer.findings), visit(answer.model), visit(answer.left_out);
+  visit(answer.printed.length), visit(answer.printed.direction);
 }
 
-ModelAnswer ModelAnswerOf(const std::string& text, const std::string& file) {
+ModelAnswer ModelAnswerOf(const std::string& text, const std::string& file,
+                          const std::string& base) {
   Diagnostics findings;
-  auto read = ReadMjcf(text, file, &findings);
-  ModelAnswer answer{.findings = findings.findings(), .model = "", .left_out = {}};
+  auto read = ReadMjcf(text, file, base, &findings);
+  ModelAnswer answer{.findings = findings.findings(), .model = "", .left_out = {}, .printed = {}};
   if (!read) return answer;
   Mechanism& mechanism = read->mechanism;
   mechanism.name = NearestName(mechanism.name);
   if (mechanism.name.empty()) mechanism.name = "robot";
   answer.model = WriteModel(mechanism);
   answer.left_out = std::move(read->left_out);
+  answer.printed = read->printed;
   return answer;
 }
 
-// The model file that an MJCF file stands for, "" after errors, and what it leaves out.
-std::pair<std::string, std::vector<ModelCaveat>> ModelOfMjcf(const std::string& file,
-                                                             Diagnostics* findings) {
+// The model file that an MJCF file stands for, empty after errors, and what it leaves out.
+std::optional<ModelAnswer> ModelOfMjcf(const std::string& file, const std::string& base,
+                                       Diagnostics* findings) {
   constexpr double kTimeout_s = 60.0;
   YamlReader reader(file);
   const auto text = reader.ReadFile();
   findings->Append(reader.diagnostics());
-  if (!text) return {};
+  if (!text) return std::nullopt;
   const auto answers =
-      InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(ModelAnswerOf(*text, file)); });
+      InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(ModelAnswerOf(*text, file, base)); });
   auto answer = answers[0] ? FromBytes<ModelAnswer>(*answers[0]) : std::nullopt;
   if (!answer) {
     findings->AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than "
                                          "{:g} s",
                                          kTimeout_s));
-    return {};
+    return std::nullopt;
   }
   for (const Finding& finding : answer->findings) findings->Add(finding);
-  if (findings->has_errors()) return {};
-  return {std::move(answer->model), std::move(answer->left_out)};
+  return findings->has_errors() ? std::nullopt : std::move(answer);
 }
 
 // Findings point to generated lines.
@@ -80,13 +83,15 @@ void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
 
 LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
   LoadResult result;
-  auto [model, left_out] = ModelOfMjcf(file, &result.diagnostics);
-  if (model.empty()) return result;
-  LoadResult loaded = LoadModelText(model, file, options);
+  auto answer = ModelOfMjcf(file, options.base, &result.diagnostics);
+  if (!answer) return result;
+  LoadOptions of_text = options;
+  of_text.printed = answer->printed;
+  LoadResult loaded = LoadModelText(answer->model, file, of_text);
   AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
   result.mechanism = std::move(loaded.mechanism);
   result.literals = std::move(loaded.literals);
-  result.caveats = std::move(left_out);
+  result.caveats = std::move(answer->left_out);
   for (ModelCaveat& caveat : loaded.caveats) result.caveats.push_back(std::move(caveat));
   return result;
 }
@@ -100,9 +105,9 @@ bool IsRobotFile(const std::string& file) {
 LoadedBodies LoadRobotBodies(const std::string& file) {
   if (!file.ends_with(".xml")) return LoadBodies(file);
   LoadedBodies result;
-  const std::string model = ModelOfMjcf(file, &result.diagnostics).first;
-  if (model.empty()) return result;
-  LoadedBodies loaded = LoadBodiesText(model, file);
+  const auto answer = ModelOfMjcf(file, "", &result.diagnostics);
+  if (!answer) return result;
+  LoadedBodies loaded = LoadBodiesText(answer->model, file);
   AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
   result.bodies = std::move(loaded.bodies);
   return result;

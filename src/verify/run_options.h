@@ -31,6 +31,7 @@ struct RunOptions {
   std::string kept_audits;
   /// The user's MJCF that the scenario was made of: it is run as it is, in addition; "": none.
   std::string source_model;
+  std::string source_base;  ///< LoadOptions::base with which it was made
   ProgressFunction progress;
 };
 

@@ -1,4 +1,5 @@
 // URDF files as exporters write them: frames as links, closure files beside them.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "kinematics/mobility.h"
@@ -177,6 +178,44 @@ TEST(UrdfDialects, LinksThatAModelFileWritesOnStayBodies) {
       LoadModel(folder.Write("o.yaml", "name: m\nurdf: r.urdf\noutputs: {tool: tip}\n"));
   ASSERT_TRUE(output.mechanism) << output.diagnostics.Text();
   EXPECT_EQ(output.mechanism->outputs[0].X_BO.translation(), Vec3(1, 0, 0));
+}
+
+// Of a robot that nothing ties to the world another link than the root can be held, where the file
+// has it; also one that is a frame.
+TEST(UrdfBase, AnyLinkCanBeHeld) {
+  const test::TestFolder folder("urdf_base");
+  const auto link = [](const char* name, double mass) {
+    return fmt::format(
+        "<link name='{}'><inertial><mass value='{}'/><inertia ixx='1' iyy='1' "
+        "izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>",
+        name, mass);
+  };
+  const std::string file = folder.Write(
+      "robot.urdf", "<robot name='r'>" + link("torso", 5) + link("leg", 2) +
+                        "<link name='sole'/>"
+                        "<joint name='hip' type='continuous'><parent link='torso'/><child "
+                        "link='leg'/><origin xyz='0.1 0 -0.4' rpy='0 0.3 0'/><axis xyz='0 1 0'/>"
+                        "</joint><joint name='ankle' type='fixed'><parent link='leg'/><child "
+                        "link='sole'/><origin xyz='0 0 -0.5'/></joint></robot>");
+  for (const char* base : {"", "torso", "leg", "sole", "so1e"}) {
+    LoadOptions options;
+    options.base = base;
+    const LoadResult loaded = LoadModel(file, options);
+    if (std::string(base) == "so1e") {
+      EXPECT_FALSE(loaded.mechanism);
+      const std::string said = loaded.diagnostics.Text();
+      EXPECT_NE(said.find("base so1e: there is no link of this name"), std::string::npos) << said;
+      EXPECT_NE(said.find("did you mean 'sole'?"), std::string::npos) << said;
+      continue;
+    }
+    ASSERT_TRUE(loaded.mechanism) << base << loaded.diagnostics.Text();
+    const Mechanism& m = *loaded.mechanism;
+    const bool is_root = std::string(base).empty() || std::string(base) == "torso";
+    EXPECT_GE(m.FindJoint(is_root ? "torso.weld" : "leg.weld"), 0) << base;
+    // All stands where the file has it.
+    EXPECT_LT(m.X_WB_home[m.FindBody("torso")].translation().norm(), 1e-15) << base;
+    EXPECT_LT((m.X_WB_home[m.FindBody("leg")].translation() - Vec3(0.1, 0, -0.4)).norm(), 1e-15);
+  }
 }
 
 }  // namespace

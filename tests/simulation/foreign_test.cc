@@ -50,7 +50,7 @@ struct Read {
 };
 Read ReadText(const std::string& text) {
   Read read;
-  read.model = ReadMjcf(text, "arm.xml", &read.diagnostics);
+  read.model = ReadMjcf(text, "arm.xml", "", &read.diagnostics);
   return read;
 }
 
@@ -67,10 +67,11 @@ struct Sample {
 };
 std::map<std::string, Sample> Samples() {
   const std::string tendons =
-      "<tendon><spatial name='t' {}><site site='tip'/><site site='base'/></spatial></tendon>";
+      "<tendon><spatial name='t' {}><site site='tip'/><site site='base'/><site site='far'/>"
+      "</spatial></tendon>";
   const std::string fixed =
       "<tendon><fixed name='t' {}><joint joint='A' coef='1'/></fixed></tendon>";
-  const std::string base = "<site name='base' pos='0.3 0 0'/>";
+  const std::string base = "<site name='base' pos='0.3 0 0'/><site name='far' pos='1 0 0'/>";
   const auto spatial = [&](const std::string& with) {
     return Arm({.in_world = base, .tail = fmt::format(fmt::runtime(tendons), with)});
   };
@@ -97,6 +98,12 @@ std::map<std::string, Sample> Samples() {
   const auto equality = [](const std::string& with) {
     return Arm({.tail = "<equality>" + with + "</equality>"});
   };
+  // A floating body that a closure carries.
+  const auto carried = [](const std::string& with) {
+    return Arm({.in_world = "<body name='loose' pos='5 0 0'><joint type='free' " + with +
+                            "/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body>",
+                .tail = "<equality><weld body1='upper' body2='loose'/></equality>"});
+  };
   std::map<std::string, Sample> samples = {
       {"option density", {option("density='1.2'"), option("density='0'")}},
       {"option viscosity", {option("viscosity='1e-3'"), option("viscosity='0'")}},
@@ -108,8 +115,14 @@ std::map<std::string, Sample> Samples() {
       {"ball frictionloss", {ball("frictionloss='3'"), ball("frictionloss='0'")}},
       {"ball armature", {ball("armature='3'"), ball("armature='0'")}},
       {"ball range", {ball("limited='true' range='0 1'"), ball("limited='false' range='0 1'")}},
+      {"free armature", {carried("armature='3'"), carried("armature='0'")}},
+      {"free frictionloss", {carried("frictionloss='3'"), carried("frictionloss='0'")}},
+      {"free damping", {carried("damping='3'"), carried("damping='0'")}},
+      {"free stiffness", {carried("stiffness='3'"), carried("stiffness='0'")}},
       {"hinge or slide damping", {joint("damping='-0.1'"), joint("damping='0.1'")}},
       {"stiffness 2nd", {joint("stiffness='3 1 2'"), joint("stiffness='3 0 0'")}},
+      {"springlength 2nd",
+       {spatial("stiffness='3' springlength='0.1 0.2'"), spatial("springlength='0.2'")}},
       {"damping 2nd", {joint("damping='3 1 2'"), joint("damping='3 0'")}},
       {"body/freejoint",
        {Arm({.in_world = "<body name='loose' pos='5 0 0'><freejoint/><inertial pos='0 0 0' "

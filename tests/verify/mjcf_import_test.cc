@@ -2,15 +2,20 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <numbers>
+#include <random>
 
 #include "features/robots/survey.h"
 #include "features/run/default_setup.h"
 #include "kinematics/mobility.h"
 #include "math/spatial.h"
+#include "mechanism/reach.h"
 #include "model_file/mesh/inertia_diagnosis.h"
 #include "model_file/write_model.h"
 #include "tests/support/solids.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/test_folder.h"
 #include "verify/model_text.h"
 
@@ -68,6 +73,207 @@ TEST(MjcfImport, ItAgreesInBothModes) {
   EXPECT_EQ(row.status, "ok") << row.message;
   EXPECT_LT(row.inverse_nrmse, 1e-10);
   EXPECT_LT(row.forward_nrmse, 1e-6);
+}
+
+// Two legs with motors at their feet carry a plate by connects; `plate` is the plate's joint and
+// `ground` what the legs stand on.
+std::string Carried(const std::string& plate, const std::string& ground = "") {
+  std::string text = "<mujoco model='carried'><compiler angle='radian'/><worldbody>" + ground;
+  if (!ground.empty()) text += "<inertial pos='0 0 0' mass='9' diaginertia='1 1 1'/>";
+  for (const auto& [leg, x] : {std::pair("left", 0.0), {"right", 0.6}}) {
+    text += fmt::format(
+        "<body name='{0}' pos='{1} 0 0'><joint name='{0}_foot' axis='0 1 0'/><inertial pos='0 0 "
+        "0.1' mass='1' diaginertia='0.01 0.01 0.001'/><body name='{0}_shank' pos='0 0 0.2'><joint "
+        "name='{0}_knee' axis='0 1 0'/><inertial pos='0 0 0.2' mass='0.7' diaginertia='0.02 0.02 "
+        "0.001'/></body></body>",
+        leg, x);
+  }
+  if (!ground.empty()) text += "</body>";
+  return text + "<body name='plate' pos='0.05 0 0.55'>" + plate +
+         "<inertial pos='0.25 0 0.02' mass='2' diaginertia='0.1 0.1 0.2'/></body></worldbody>"
+         "<equality>"
+         "<weld name='left_hip' body1='left_shank' body2='plate' relpose='0.05 0 0.35 1 0 0 0'/>"
+         "<connect name='right_hip' body1='plate' body2='right_shank' anchor='0.5 0 0'/></equality>"
+         "<actuator><motor name='a' joint='left_foot'/><motor name='b' joint='right_foot'/>"
+         "</actuator></mujoco>";
+}
+
+LoadOptions Holding(const std::string& base) {
+  LoadOptions options;
+  options.base = base;
+  return options;
+}
+
+std::vector<std::string> LeftOut(const LoadResult& loaded) {
+  return TextsOf(loaded.caveats, ModelCaveat::Kind::kLeftOut);
+}
+
+// A platform written as a free body moves: as a body of one of its legs it has the same forces.
+TEST(MjcfImport, AFreeBodyThatLoopsCarryMoves) {
+  const test::TestFolder folder("mjcf_carried");
+  const LoadResult loaded = LoadText(folder, Carried("<freejoint name='float'/>"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_EQ(loaded.mechanism->joints[loaded.mechanism->FindJoint("float")].kind, JointKind::kFree);
+  EXPECT_TRUE(LeftOut(loaded).empty());
+  EXPECT_NE(loaded.diagnostics.Text().find("plate is free to move"), std::string::npos);
+  EXPECT_EQ(AnalyseMobility(*loaded.mechanism).dofs, 2);
+  const SurveyRow row = SurveyFile(folder.PathOf("robot.xml"), folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  std::string nested = Carried("");
+  const std::string weld =
+      nested.substr(nested.find("<weld"), nested.find("<connect") - nested.find("<weld"));
+  const std::string plate =
+      nested.substr(nested.find("<body name='plate'"),
+                    nested.find("</worldbody>") - nested.find("<body name='plate'"));
+  nested.replace(nested.find(weld), weld.size(), "");
+  nested.replace(nested.find(plate), plate.size(), "");
+  nested.insert(nested.find("</body></body>"),
+                "<body name='plate' pos='0.05 0 0.35'>" + plate.substr(plate.find("<inertial")));
+  const LoadResult as_leg = LoadText(folder, nested);
+  ASSERT_TRUE(as_leg.mechanism) << as_leg.diagnostics.Text();
+  const std::vector<double> force = TuneHomeServos(*loaded.mechanism).force;
+  ASSERT_EQ(force.size(), 2u);
+  for (size_t d = 0; d < 2; ++d) {
+    EXPECT_GT(std::abs(force[d]), 0.1);
+    EXPECT_NEAR(force[d], TuneHomeServos(*as_leg.mechanism).force[d], 1e-9);
+  }
+  // What pushes the floating body and is not modelled is said.
+  const LoadResult damped = LoadText(folder, Carried("<joint type='free' damping='3'/>"));
+  ASSERT_EQ(LeftOut(damped).size(), 1u);
+  EXPECT_EQ(damped.caveats[0].source, "free damping");
+}
+
+TEST(MjcfImport, OfFloatingBodiesOneIsHeld) {
+  const test::TestFolder folder("mjcf_base");
+  const std::string text = Carried("<freejoint/>", "<body name='ground' pos='0 0 1'><freejoint/>");
+  struct {
+    const char* base;
+    std::string held, error;
+    Pose X;
+  } cases[] = {{"", "ground", "", Pose(Eigen::Translation3d(0, 0, 1))},
+               {"ground", "ground", "", Pose(Eigen::Translation3d(0, 0, 1))},
+               {"plate", "plate", "", Pose(Eigen::Translation3d(0.05, 0, 0.55))},
+               {"left_shank", "left_shank", "", Pose(Eigen::Translation3d(0, 0, 1.2))},
+               {"shank", "", "base shank: there is no body of this name", {}}};
+  for (const auto& at : cases) {
+    // In the file's pose the ground is not where its legs would carry the plate.
+    const std::string file = folder.Write("robot.xml", text);
+    const LoadResult loaded = LoadRobot(file, Holding(at.base));
+    ASSERT_EQ(loaded.mechanism.has_value(), at.error.empty()) << loaded.diagnostics.Text();
+    if (!loaded.mechanism) {
+      EXPECT_NE(loaded.diagnostics.Text().find(at.error), std::string::npos);
+      continue;
+    }
+    const Mechanism& m = *loaded.mechanism;
+    ASSERT_EQ(LeftOut(loaded).size(), 1u) << at.base;
+    EXPECT_EQ(LeftOut(loaded)[0],
+              "the free joint of " + at.held + " is left out: the body is held where it is");
+    EXPECT_TRUE(m.X_WB_home[m.FindBody(at.held)].isApprox(at.X, 1e-12)) << at.base;
+    EXPECT_EQ(AnalyseMobility(m).dofs, 2) << at.base;
+  }
+  const LoadResult tied =
+      LoadRobot(folder.Write("tied.xml", Carried("<freejoint/>")), Holding("plate"));
+  EXPECT_FALSE(tied.mechanism);
+  EXPECT_NE(tied.diagnostics.Text().find("base plate: the body does not float"), std::string::npos);
+}
+
+// Three rods side by side, parallel to each other, and a coupler on top; each body's axes are
+// turned at random, so that all numbers are printed with `digits` decimals.
+std::string Rods(int digits, double spoilt = 0.0) {
+  const auto text_of = [digits](const auto& numbers) {
+    std::string text;
+    for (const double x : numbers) text += fmt::format("{:.{}f} ", x, digits);
+    return text;
+  };
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  const auto turn = [&] {
+    const Eigen::Quaterniond q(normal(random), normal(random), normal(random), normal(random));
+    return Mat3(q.normalized().toRotationMatrix());
+  };
+  const Vec3 rod(0.05, 0, 0.24), feet[] = {{0, 0, 0}, {0.3, 0, 0.05}, {0.14, 0.06, 0.02}};
+  const auto body = [&](const std::string& name, const Mat3& R_PB, const Vec3& p_PB,
+                        const Mat3& R_WB, const std::string& inner) {
+    const Eigen::Quaterniond q(R_PB);
+    return fmt::format(
+        "<body name='{0}' pos='{1}' quat='{2}'><joint name='j{0}' axis='{3}'/>"
+        "<inertial pos='{4}' mass='0.5' diaginertia='0.01 0.01 0.01'/>{5}</body>",
+        name, text_of(p_PB), text_of(std::array{q.w(), q.x(), q.y(), q.z()}),
+        text_of(Vec3(R_WB.transpose() * Vec3::UnitY())),
+        text_of(Vec3(R_WB.transpose() * Vec3(0.05, 0, 0.1))), inner);
+  };
+  const Mat3 R_coupler = turn();
+  std::string bodies, connects;
+  for (int i = 0; i < 3; ++i) {
+    const Mat3 R = turn();
+    const std::string name = fmt::format("rod{}", i);
+    const Vec3 end = R.transpose() * (rod + Vec3(0, 0, i == 2 ? spoilt : 0));
+    const std::string inner =
+        i > 0 ? "" : body("coupler", R.transpose() * R_coupler, end, R_coupler, "");
+    bodies += body(name, R, feet[i], R, inner);
+    if (i == 0) continue;
+    connects += fmt::format("<connect name='c{}' body1='{}' body2='coupler' anchor='{}'/>", i, name,
+                            text_of(end));
+  }
+  return "<mujoco model='rods'><compiler angle='radian'/><worldbody>" + bodies +
+         "</worldbody><equality>" + connects +
+         "</equality><actuator><motor name='m' joint='jrod0'/></actuator></mujoco>";
+}
+
+// Rounded numbers keep overconstrained loops from moving: what the printed digits explain is taken
+// for rounding, and said; no more.
+TEST(MjcfImport, LoopsThatOnlyPrintedDigitsKeepFromMovingMove) {
+  const test::TestFolder folder("mjcf_rounded");
+  for (const int digits : {4, 6, 8}) {
+    const std::string file = folder.Write("robot.xml", Rods(digits));
+    const LoadResult loaded = LoadRobot(file);
+    ASSERT_TRUE(loaded.mechanism) << digits << loaded.diagnostics.Text();
+    EXPECT_EQ(AnalyseMobility(*loaded.mechanism).dofs, 1) << digits;
+    EXPECT_EQ(AnalyseMobility(*loaded.mechanism).redundant, 3) << digits;
+    ASSERT_EQ(LeftOut(loaded).size(), 1u) << digits;
+    EXPECT_NE(LeftOut(loaded)[0].find("rounding of the file's numbers: joint frames moved by"),
+              std::string::npos);
+    const SurveyRow row = SurveyFile(file, folder.PathOf("scratch"));
+    EXPECT_EQ(row.status, "ok") << digits << row.message;
+    EXPECT_EQ(row.caveats.size(), 1u);
+    // A rod that is longer by much more than a digit is another mechanism.
+    const double wrong = 3000.0 * std::pow(10.0, -digits);
+    LoadOptions none;
+    none.closure_tolerance_m = 0.0;
+    const LoadResult strict = LoadRobot(file, none);
+    EXPECT_TRUE(!strict.mechanism || AnalyseMobility(*strict.mechanism).dofs == 0) << digits;
+    const LoadResult spoilt = LoadRobot(folder.Write("spoilt.xml", Rods(digits, wrong)));
+    EXPECT_TRUE(!spoilt.mechanism || AnalyseMobility(*spoilt.mechanism).dofs == 0) << digits;
+  }
+  EXPECT_TRUE(LeftOut(LoadText(folder, Rods(17))).empty());
+}
+
+// A model that was written as MJCF and read again has the same drives, and they hold its home with
+// the same forces; springs, legs, elements and bodies that float in their loops come back.
+TEST(MjcfImport, WhatIsExportedComesBack) {
+  const test::TestFolder folder("mjcf_round_trip");
+  int compared = 0;
+  for (const char* name : {"four_bar", "spr_tripod", "stewart", "cabin_robot", "scara_robot",
+                           "andrews_squeezer", "geared_press", "spring_cart"}) {
+    const LoadResult shipped = LoadModel(SourcePath(fmt::format("/models/{}/model.yaml", name)));
+    ASSERT_TRUE(shipped.mechanism) << name;
+    const LoadResult back = LoadText(folder, MjcfFor(*shipped.mechanism, ModelDrives::kHeld).text);
+    ASSERT_TRUE(back.mechanism) << name << back.diagnostics.Text();
+    EXPECT_TRUE(LeftOut(back).empty()) << name << back.diagnostics.Text();
+    const Mechanism &a = *shipped.mechanism, &b = *back.mechanism;
+    ASSERT_EQ(a.drives.size(), b.drives.size()) << name;
+    EXPECT_EQ(AnalyseMobility(a).dofs, AnalyseMobility(b).dofs) << name;
+    const HomeServos expected = TuneHomeServos(a), got = TuneHomeServos(b);
+    if (!expected.summary.ok()) continue;
+    ASSERT_TRUE(got.summary.ok()) << name << got.summary.message;
+    ++compared;
+    double scale = 0.0;  // all weights, at arm's length
+    for (const Body& body : a.bodies) scale += 9.81 * body.mass * CharacteristicLength(a);
+    for (size_t d = 0; d < a.drives.size(); ++d) {
+      EXPECT_NEAR(got.force[d], expected.force[d], 1e-9 * scale) << name << " " << a.drives[d].name;
+    }
+  }
+  EXPECT_GE(compared, 6);
 }
 
 TEST(MjcfImport, WhatAMechanismCannotExpressIsAFinding) {

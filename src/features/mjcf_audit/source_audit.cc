@@ -72,6 +72,7 @@ SourceModelRuns::SourceModelRuns(const SourceModelRequest& request)
   length_m_ = CharacteristicLength(prepared_.base);
   task_.file = request.file;
   task_.text = request.text.empty() ? ReadWholeFile(request.file).value_or("") : request.text;
+  task_.base = request.base;
   task_.mechanism = &prepared_.base;
   task_.duration_s = motion_.duration_s;
   task_.sample_s = motion_.sample_s;

@@ -16,6 +16,7 @@ namespace mbv {
 struct SourceModelRequest {
   std::string file;                    ///< the user's MJCF
   std::string text = {};               ///< its text; "": read from the file
+  std::string base = {};               ///< LoadOptions::base with which the scenario was made
   const Prepared* prepared = nullptr;  ///< the scenario that was made of it
   /// Channels of reactions that statics leaves open.
   std::vector<std::string> reactions_not_unique = {};

@@ -56,7 +56,7 @@ void ReportSettings(SourceModel* own);
 /// against the commanded motion.
 void FindLeads(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own);
 /// Holds free bodies and changes what the task's settings say.
-void TakeSettings(const SourceModelTask& task, SourceModel* own);
+void TakeSettings(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own);
 
 class OwnStepper {
  public:
@@ -120,7 +120,7 @@ class SourceModelMaker {
     std::vector<std::string> warnings;
     const EngineSession session(&warnings);
     Diagnostics findings;
-    auto imported = ImportMjcf(task_.text, task_.file, warnings, &findings);
+    auto imported = ImportMjcf(task_.text, task_.file, task_.base, warnings, &findings);
     if (!imported) return Unsupported("the file was refused: " + findings.Text());
     imported_ = &*imported;
     if (RunSummary summary = FindDrives(*imported->model); !summary.ok()) return summary;
@@ -131,7 +131,7 @@ class SourceModelMaker {
     FindHome();
     ReportSettings(&own_);
     FindLeads(task_, *imported_, &own_);
-    TakeSettings(task_, &own_);
+    TakeSettings(task_, *imported_, &own_);
     return RunSummary::Done();
   }
 
@@ -139,6 +139,9 @@ class SourceModelMaker {
   RunSummary FindDrives(const mjModel& m) {
     if (imported_->mechanism.joints.size() != mechanism_.joints.size()) {
       return Unsupported("the scenario's model is not the one that this file gives");
+    }
+    if (std::ranges::count(imported_->joint_of, -1) > 0) {
+      return Unsupported("in the file a free body cannot stand in for the one that is held");
     }
     for (const Drive& drive : mechanism_.drives) {
       const auto* on = std::get_if<JointDrive>(&drive.kind);
@@ -217,6 +220,11 @@ class SourceModelMaker {
       const int at = m_->jnt_qposadr[j], body = m_->jnt_bodyid[j];
       if (m_->jnt_type[j] == mjJNT_HINGE || m_->jnt_type[j] == mjJNT_SLIDE) {
         own_.home[at] = m_->qpos0[at] + joint.home[0];
+      } else if (m_->jnt_type[j] == mjJNT_FREE) {
+        const Pose& X_WB = mechanism_.X_WB_home[static_cast<size_t>(joint.child)];
+        const Eigen::Quaterniond turn(X_WB.linear());
+        own_.home.segment<3>(at) = X_WB.translation();
+        own_.home.segment<4>(at + 3) << turn.w(), turn.x(), turn.y(), turn.z();
       } else if (m_->jnt_type[j] == mjJNT_BALL) {
         const mjtNum* q = m_->body_quat + 4 * body;
         Mat3 R = mechanism_.X_WB_home[static_cast<size_t>(joint.parent)].linear();
@@ -251,8 +259,8 @@ namespace {
 
 class SettingsTaker {
  public:
-  SettingsTaker(const SourceModelTask& task, SourceModel* own)
-      : task_(task), own_(*own), m_(own->m.get()) {}
+  SettingsTaker(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own)
+      : task_(task), imported_(imported), own_(*own), m_(own->m.get()) {}
 
   void Run() {
     ReportLeftOut();
@@ -263,8 +271,11 @@ class SettingsTaker {
   }
 
  private:
-  [[nodiscard]] bool IsHeld(int dof) const {
-    return m_->jnt_type[m_->dof_jntid[dof]] == mjJNT_FREE;
+  // A free joint whose body does not move.
+  [[nodiscard]] bool IsHeld(int j) const {
+    const auto joint = static_cast<size_t>(imported_.joint_of[static_cast<size_t>(j)]);
+    return m_->jnt_type[j] == mjJNT_FREE &&
+           imported_.mechanism.joints[joint].kind == JointKind::kFixed;
   }
 
   [[nodiscard]] bool HasFriction(int dof) const {
@@ -275,14 +286,14 @@ class SettingsTaker {
   template <typename Visit>
   void ForLeftOut(const Visit& visit) {
     for (int dof = 0; dof < m_->nv; ++dof) {
-      if (IsHeld(dof)) continue;
+      if (IsHeld(m_->dof_jntid[dof])) continue;
       if (IsScalar(*m_, m_->dof_jntid[dof])) continue;  // force elements
       visit("friction loss", &m_->dof_frictionloss[dof]);
       visit("armature", &m_->dof_armature[dof]);
       visit("damping", &m_->dof_damping[dof]);
     }
     for (int j = 0; j < m_->njnt; ++j) {
-      if (!IsScalar(*m_, j)) visit("springs of balls", &m_->jnt_stiffness[j]);
+      if (!IsScalar(*m_, j) && !IsHeld(j)) visit("springs of balls", &m_->jnt_stiffness[j]);
     }
     for (int t = 0; t < m_->ntendon; ++t) {
       visit("tendon springs", &m_->tendon_stiffness[t]);
@@ -313,7 +324,7 @@ class SettingsTaker {
     double most = 0.0;
     for (int b = 0; b < m_->nbody; ++b) most = std::max(most, m_->body_subtreemass[b]);
     for (int j = 0; j < m_->njnt; ++j) {
-      if (m_->jnt_type[j] != mjJNT_FREE) continue;
+      if (!IsHeld(j)) continue;
       own_.facts.held.push_back(NameAt(*m_, mjOBJ_BODY, m_->jnt_bodyid[j], "body"));
       const double length = std::max(m_->stat.extent, 1e-3);
       for (int i = 0; i < 6; ++i) {
@@ -362,6 +373,7 @@ class SettingsTaker {
   }
 
   const SourceModelTask& task_;
+  const ImportedMjcf& imported_;
   SourceModel& own_;
   mjModel* const m_;
 };
@@ -391,7 +403,9 @@ void ReportSettings(SourceModel* own) {
   }
 }
 
-void TakeSettings(const SourceModelTask& task, SourceModel* own) { SettingsTaker(task, own).Run(); }
+void TakeSettings(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own) {
+  SettingsTaker(task, imported, own).Run();
+}
 
 // What leads the drives of a user's model, and what is switched off.
 

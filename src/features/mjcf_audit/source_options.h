@@ -44,6 +44,7 @@ struct SourceModelSettings {
 
 struct SourceModelTask {
   std::string text, file;                ///< MJCF as the user wrote it
+  std::string base;                      ///< LoadOptions::base with which `mechanism` was made
   const Mechanism* mechanism = nullptr;  ///< made of the file, with all drives
   DrivenMotion driven;                   ///< of the drives; starts at home at rest
   double duration_s = 1.0;
@@ -65,7 +66,7 @@ struct SourceModelFacts {
   std::vector<DriveLead> leads;             ///< per drive
   std::vector<std::string> motors;          ///< per drive: its motor in the file, or ""
   std::vector<std::string> left_out;        ///< "armature", "damping", …
-  std::vector<std::string> held;            ///< free bodies
+  std::vector<std::string> held;            ///< free bodies that do not move
   std::vector<std::string> damped;          ///< servos with a `kv`, which MuJoCo 2.2 drops
   std::vector<std::string> couplings, unused_actuators;  ///< equalities and actuators that are off
 };

@@ -174,10 +174,8 @@ class Initialiser {
   }
 
   void WriteFromFile(const fs::path& model, const fs::path& scenario) {
-    LoadOptions options;
-    options.assembly = options_.assembly;
     DefaultSetupResult made =
-        MakeDefaultSetup(options_.from, options_.name, options_.name, options);
+        MakeDefaultSetup(options_.from, options_.name, options_.name, options_.load);
     result_.diagnostics.Append(made.diagnostics);
     if (!made.setup) return;
     const std::string head =
@@ -221,11 +219,11 @@ namespace {
 
 struct InitArguments {
   InitOptions options;
-  std::vector<std::string> assembly;
+  RobotArguments robot;
 };
 
 int Init(InitArguments arguments) {
-  if (!ReadAssembly(arguments.assembly, &arguments.options.assembly)) return 2;
+  if (!ReadRobotOptions(arguments.robot, &arguments.options.load)) return 2;
   const InitResult result = InitModel(arguments.options);
   SayText(stderr, result.diagnostics.Text());
   if (result.files.empty()) return result.exit_code;
@@ -250,7 +248,7 @@ void AddInitCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   init->add_option("--into", options->into, "folder that gets models/ and scenarios/")
       ->capture_default_str();
-  AddAssemblyOption(init, &arguments->assembly);
+  AddRobotOptions(init, &arguments->robot);
   SetFooter(init,
             {"init my_linkage && mbverify run scenarios/my_linkage/first.yaml",
              "init my_crank --from slider_crank", "init my_robot --from my_robot.urdf"},

@@ -1,11 +1,11 @@
 // `mbverify init`: a model and a scenario to begin with, in the user's folder.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
 #include "base/diagnostics.h"
+#include "model_file/load_model.h"
 
 namespace mbv {
 
@@ -19,10 +19,10 @@ struct Starter {
 [[nodiscard]] const std::vector<Starter>& Starters();
 
 struct InitOptions {
-  std::string name;                          ///< a letter, then letters, digits and '_'
-  std::string from = "four_bar";             ///< of Starters(), or a robot's file (.urdf, .xml)
-  std::string into = ".";                    ///< folder that gets models/NAME and scenarios/NAME
-  std::map<std::string, int> assembly = {};  ///< LoadOptions::assembly, of a robot
+  std::string name;               ///< a letter, then letters, digits and '_'
+  std::string from = "four_bar";  ///< of Starters(), or a robot's file (.urdf, .xml)
+  std::string into = ".";         ///< folder that gets models/NAME and scenarios/NAME
+  LoadOptions load = {};          ///< of a robot
 };
 
 struct InitResult {

@@ -35,7 +35,8 @@ namespace fs = std::filesystem;
 
 struct ModelArguments {
   std::string model, format, out, drives;
-  std::vector<std::string> set, assembly;
+  std::vector<std::string> set;
+  RobotArguments robot;
   JsonOption json;
 };
 
@@ -67,11 +68,14 @@ int Model(const ModelArguments& arguments) {
   }
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
-  if (!ReadAssembly(arguments.assembly, &options.assembly)) return 2;
+  if (!ReadRobotOptions(arguments.robot, &options)) return 2;
   const auto file = FindModel(arguments.model, ".");
   if (!file) {
     return Refuse(fmt::format("there is no model '{}'", arguments.model),
                   ModelHint(arguments.model, "."));
+  }
+  if (arguments.robot.any() && !IsRobotFile(*file)) {
+    return RefuseRobotOptions();
   }
   const InputWatch inputs;
   const LoadResult loaded = LoadRobot(*file, options);
@@ -261,7 +265,7 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
   arguments->json.AddTo(model);
   model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
       ->allow_extra_args(false);
-  AddAssemblyOption(model, &arguments->assembly);
+  AddRobotOptions(model, &arguments->robot);
   SetFooter(model,
             {"model stabilizing_platform", "model four_bar --set crank=0.16",
              "model spr_tripod --format mjcf --out spr_tripod.xml",

@@ -98,9 +98,10 @@ bool RunMode(const std::string& scenario, const char* mode, double* nrmse, Surve
   return false;
 }
 
-void Survey(const std::string& file, const std::string& scratch, SurveyRow* row) {
+void Survey(const std::string& file, const std::string& scratch, const LoadOptions& options,
+            SurveyRow* row) {
   // The robot as it is, before drives are added to it.
-  LoadResult loaded = LoadRobot(file);
+  LoadResult loaded = LoadRobot(file, options);
   if (!loaded.mechanism) {
     const Finding error = FirstError(loaded.diagnostics);
     row->message = WithHint(error);
@@ -108,7 +109,7 @@ void Survey(const std::string& file, const std::string& scratch, SurveyRow* row)
     return;
   }
   MeasureHome(*loaded.mechanism, row);
-  DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
+  DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml", options);
   if (!made.setup) {
     row->message = WithHint(FirstError(made.diagnostics));
     row->status = "failed";
@@ -179,11 +180,12 @@ const std::vector<std::string> kSurveyColumns = {
 
 }  // namespace
 
-SurveyRow SurveyFile(const std::string& file, const std::string& scratch) {
+SurveyRow SurveyFile(const std::string& file, const std::string& scratch,
+                     const LoadOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   SurveyRow row;
   row.file = file;
-  Survey(file, scratch, &row);
+  Survey(file, scratch, options, &row);
   row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return row;
 }
@@ -289,12 +291,15 @@ namespace fs = std::filesystem;
 struct SurveyArguments {
   std::string folder, out;
   double timeout_s = 300.0;
+  LoadOptions load;
   JsonOption json;
 };
 
-SurveyRow RowOf(const std::string& file, const std::string& scratch, double timeout_s) {
-  const auto texts =
-      InChildren(1, timeout_s, [&](size_t) { return ToBytes(SurveyFile(file, scratch)); });
+SurveyRow RowOf(const std::string& file, const std::string& scratch,
+                const SurveyArguments& arguments) {
+  const double timeout_s = arguments.timeout_s;
+  const auto texts = InChildren(
+      1, timeout_s, [&](size_t) { return ToBytes(SurveyFile(file, scratch, arguments.load)); });
   SurveyRow lost{.file = file};
   if (!texts[0]) {
     lost.message = fmt::format("ended by a crash, or not finished after {:g} s", timeout_s);
@@ -350,8 +355,7 @@ int Survey(const SurveyArguments& arguments) {
   }
   std::vector<SurveyRow> rows;
   for (size_t i = 0; i < files.size(); ++i) {
-    rows.push_back(
-        RowOf(files[i], (scratch.path() / fmt::format("{}", i)).string(), arguments.timeout_s));
+    rows.push_back(RowOf(files[i], (scratch.path() / fmt::format("{}", i)).string(), arguments));
     rows.back().file = fs::path(files[i]).lexically_relative(arguments.folder).string();
     Say(stderr, "{} of {}: {} {}\n", i + 1, files.size(), rows.back().file, rows.back().status);
   }
@@ -372,6 +376,7 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
   survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
       ->check(Positive())
       ->capture_default_str();
+  AddToleranceOption(survey, &arguments->load.closure_tolerance_m);
   arguments->json.AddTo(survey);
   SetFooter(survey, {"survey my_robots --out out"},
             "0 all ok (caveats are listed), or refused for a fault of the file itself; 1 some "

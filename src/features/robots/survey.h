@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/types.h"
+#include "model_file/load_model.h"
 
 namespace mbv {
 
@@ -23,7 +24,8 @@ struct SurveyRow {
 
 /// Loads a robot, gives it a first motion and runs that forward and inverse. Writes only below
 /// `scratch`.
-[[nodiscard]] SurveyRow SurveyFile(const std::string& file, const std::string& scratch);
+[[nodiscard]] SurveyRow SurveyFile(const std::string& file, const std::string& scratch,
+                                   const LoadOptions& options = {});
 
 /// For the way out of a child process (math/bytes.h).
 template <typename Visit>

@@ -27,6 +27,8 @@ std::vector<Coordinate> Candidates(const Mechanism& m) {
     candidates.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
   }
   for (size_t j = 0; j < m.joints.size(); ++j) {
+    if (m.joints[j].kind == JointKind::kFree)
+      continue;  // nothing is there that a drive could act on
     for (int c = 0; c < DofsOf(m.joints[j].kind); ++c) {
       const bool driven = std::any_of(m.drives.begin(), m.drives.end(), [&](const Drive& drive) {
         const auto* on = std::get_if<JointDrive>(&drive.kind);
@@ -104,6 +106,7 @@ std::vector<Coordinate> TurnsLeft(const Mechanism& m, const std::vector<Coordina
 // "J.0, J.1 …", as a scenario names start values.
 std::vector<std::string> StartNames(const Mechanism& m, const std::vector<Coordinate>& turns) {
   std::vector<std::string> names;
+  names.reserve(turns.size());
   for (const Coordinate& turn : turns) {
     names.push_back(
         fmt::format("{}.{}", m.joints[static_cast<size_t>(turn.index)].name, turn.component));
@@ -358,8 +361,11 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   if (setup.by_forces > 0) AddOutputs(&m);
   if (!name.empty()) m.name = name;
   if (m.drives.empty() && by_forces.empty()) {
-    result.diagnostics.AddError(file,
-                                "the mechanism has no degree of freedom: there is nothing to move");
+    result.diagnostics.Add({Severity::kError, file, 0, 0,
+                            "the mechanism has no degree of freedom: there is nothing to move",
+                            "`mbverify model` says what holds it; loops that only rounded numbers "
+                            "keep from moving take "
+                            "--closure-tolerance METRES"});
     return result;
   }
   // Added drives hold what the robot's own ones leave free; without own ones all move.

@@ -65,7 +65,8 @@ RunOutcome OutOfMemory(const std::string& file, const ScenarioOptions& options) 
 namespace {
 
 struct RunArguments {
-  std::vector<std::string> scenarios, set, assembly, data;
+  std::vector<std::string> scenarios, set, data;
+  RobotArguments robot;
   std::string out = "out", mode, report_script, kept_audits, agreed;
   JsonOption json;
   bool no_report = false, no_pictures = false, no_source_model = false, quiet = false,
@@ -133,7 +134,7 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
 bool SetUpRobot(const std::string& robot, const RunArguments& arguments, FindingPrinter* findings,
                 std::string* scenario) {
   LoadOptions options;
-  if (!ReadAssembly(arguments.assembly, &options.assembly)) return false;
+  if (!ReadRobotOptions(arguments.robot, &options)) return false;
   const DefaultSetupResult made = MakeDefaultSetup(robot, "", "./model.yaml", options);
   findings->Print(made.diagnostics);
   if (!made.setup) return false;
@@ -182,12 +183,12 @@ int Run(const RunArguments& arguments) {
   RunCounts counts;
   auto results = nlohmann::ordered_json::array();
   int exit_code = 0;
-  if (!arguments.assembly.empty() && std::ranges::none_of(files, IsRobotFile)) {
-    return Refuse("--assembly is for robots (.urdf, .xml)",
-                  "in a model file, guesses of the joints say which assembly is meant");
+  if (arguments.robot.any() && std::ranges::none_of(files, IsRobotFile)) {
+    return RefuseRobotOptions();
   }
   for (const std::string& given : files) {
     std::string file = given;
+    options.source_base = arguments.robot.base;
     options.source_model = given.ends_with(".xml") && !arguments.no_source_model ? given : "";
     if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
       exit_code = WorseExit(exit_code, 2);
@@ -225,7 +226,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   run->add_option("--set", arguments->set,
                   "key=value: overrides a value of the scenario (repeatable)")
       ->allow_extra_args(false);
-  AddAssemblyOption(run, &arguments->assembly);
+  AddRobotOptions(run, &arguments->robot);
   run->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
   run->add_flag("--no-report", arguments->no_report, "do not write report.html");
   run->add_flag("--no-own-file", arguments->no_source_model,

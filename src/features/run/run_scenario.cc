@@ -506,6 +506,7 @@ class ScenarioRun {
     if (options_.source_model.empty()) return;
     report_.source_model = std::make_shared<const SourceModelAudit>(
         AuditSourceModel({.file = options_.source_model,
+                          .base = options_.source_base,
                           .prepared = &*prepared_,
                           .reactions_not_unique = report_.reactions_not_unique,
                           .progress = options_.progress}));

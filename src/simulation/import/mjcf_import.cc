@@ -6,11 +6,13 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "base/demand.h"
 #include "base/text.h"
 #include "math/spatial.h"
+#include "mechanism/joint_pose.h"
 #include "simulation/mjcf/foreign_rows.h"
 
 namespace mbv::simulation {
@@ -71,20 +73,35 @@ void AddJoint(int j, const Ends& ends, const Pose& X_PB, MjcfImport* in) {
       joint.home = {rpy.x(), rpy.y(), rpy.z(), 0, 0, 0};
       break;
     }
-    default:  // free
-      joint.kind = JointKind::kFixed;
-      joint.X_PF = PoseAt(in->qpos + at, in->qpos + at + 3);
-      in->held.push_back(in->mechanism.bodies[static_cast<size_t>(ends.outboard)].name);
+    default: {  // free
+      const std::string& body = in->mechanism.bodies[static_cast<size_t>(ends.outboard)].name;
+      const Pose X_WB = PoseAt(in->qpos + at, in->qpos + at + 3);
+      if (in->moves[static_cast<size_t>(j)]) {
+        joint.kind = JointKind::kFree;
+        joint.home = CoordinatesOf(joint, X_WB);
+        in->carried.push_back(body);
+      } else {
+        joint.kind = JointKind::kFixed;
+        joint.X_PF = X_WB;
+        in->held.push_back(body);
+      }
       break;
+    }
   }
   joint.guess = joint.home;
   in->joint_of[static_cast<size_t>(j)] = static_cast<int>(in->mechanism.joints.size());
   in->mechanism.joints.push_back(joint);
 }
 
+// The top joint of a tree in which another body is held carries nothing.
+bool IsHeldInside(const MjcfImport& in, int b) {
+  return in.held_inside >= 0 && in.m.body_rootid[in.held_inside] == b;
+}
+
 void AddBody(int b, MjcfImport* in) {
   const std::string name = in->NameOf(mjOBJ_BODY, b, "body");
-  const int first = in->m.body_jntadr[b], count = in->m.body_jntnum[b];
+  const int first = in->m.body_jntadr[b];
+  const int count = IsHeldInside(*in, b) ? 0 : in->m.body_jntnum[b];
   int inboard = in->body_of[static_cast<size_t>(in->m.body_parentid[b])];
   Pose X_PB = PoseAt(in->m.body_pos + 3 * b, in->m.body_quat + 4 * b);
   // Each joint but the last carries a massless piece that lies where the body does.
@@ -96,7 +113,9 @@ void AddBody(int b, MjcfImport* in) {
     inboard = outboard;
     X_PB = Pose::Identity();
   }
-  if (count == 0) {
+  if (IsHeldInside(*in, b)) {
+    inboard = NewBody(in, name);
+  } else if (count == 0) {
     const int outboard = NewBody(in, name);
     Joint weld;
     weld.name = name + "_fixed";
@@ -116,7 +135,76 @@ void AddBody(int b, MjcfImport* in) {
   if (body.mass == 0.0) body.I_Bcm_B.setZero();
 }
 
+// In the pose of the file.
+void HoldInside(MjcfImport* in) {
+  const DataHandle data = MakeData(in->m);
+  std::copy(in->qpos, in->qpos + in->m.nq, data->qpos);
+  mj_kinematics(&in->m, data.get());
+  const int b = in->held_inside;
+  Joint weld;
+  weld.name = in->NameOf(mjOBJ_BODY, b, "body") + "_held";
+  weld.child = in->body_of[static_cast<size_t>(b)];
+  weld.X_PF = PoseAt(data->xpos + 3 * b, data->xquat + 4 * b);
+  in->mechanism.joints.push_back(weld);
+  in->held.push_back(in->BodyOf(b).name);
+}
+
+bool IsFree(const mjModel& m, int b) {
+  return m.body_jntnum[b] > 0 && m.jnt_type[m.body_jntadr[b]] == mjJNT_FREE;
+}
+
+// Per body, the first root of the trees that closures tie to its own; 0 where they tie it to what
+// does not float.
+std::vector<int> TiedTo(const MjcfImport& in) {
+  const mjModel& m = in.m;
+  std::vector<int> group(static_cast<size_t>(m.nbody));
+  for (int b = 0; b < m.nbody; ++b) {
+    const int root = m.body_rootid[b];
+    group[static_cast<size_t>(b)] = IsFree(m, root) ? root : 0;
+  }
+  for (int e = 0; e < m.neq && !in.EqualitiesAreOff(); ++e) {
+    const bool ties = m.eq_type[e] == mjEQ_CONNECT || m.eq_type[e] == mjEQ_WELD;
+    if (!ties || m.eq_active[e] == 0) continue;
+    const int a = group[static_cast<size_t>(m.eq_obj1id[e])];
+    const int b = group[static_cast<size_t>(m.eq_obj2id[e])];
+    std::ranges::replace(group, std::max(a, b), std::min(a, b));
+  }
+  return group;
+}
+
 }  // namespace
+
+void ChooseHeld(MjcfImport* in) {
+  const mjModel& m = in->m;
+  const std::vector<int> tied_to = TiedTo(*in);
+  in->moves.assign(static_cast<size_t>(m.njnt), false);
+  int base = -1;  // by option
+  if (!in->base.empty()) {
+    std::vector<std::string> names;
+    for (int b = 1; b < m.nbody; ++b) {
+      names.push_back(in->NameOf(mjOBJ_BODY, b, "body"));
+      if (names.back() == in->base) base = b;
+    }
+    if (base < 0) {
+      in->Refuse(fmt::format("base {}: there is no body of this name", in->base),
+                 DidYouMean(in->base, names));
+    } else if (tied_to[static_cast<size_t>(base)] == 0) {
+      in->Refuse(fmt::format("base {}: the body does not float, its joints or loops hold it in the "
+                             "world",
+                             in->base),
+                 "only what hangs together on free joints needs a base");
+      base = -1;
+    }
+  }
+  for (int j = 0; j < m.njnt; ++j) {
+    if (m.jnt_type[j] != mjJNT_FREE) continue;
+    const int body = m.jnt_bodyid[j], first = tied_to[static_cast<size_t>(body)];
+    const bool chosen = base >= 0 && tied_to[static_cast<size_t>(base)] == first;
+    const int held = chosen ? m.body_rootid[base] : first;
+    in->moves[static_cast<size_t>(j)] = body != held;
+    if (chosen && body == held && base != body) in->held_inside = base;
+  }
+}
 
 void AddTree(MjcfImport* in) {
   in->qpos = in->m.nkey > 0 ? in->m.key_qpos : in->m.qpos0;
@@ -124,15 +212,43 @@ void AddTree(MjcfImport* in) {
   in->joint_of.assign(static_cast<size_t>(in->m.njnt), -1);
   (void)NewBody(in, "world");
   for (int b = 1; b < in->m.nbody; ++b) AddBody(b, in);
+  if (in->held_inside >= 0) HoldInside(in);
 }
 
 // Drives of an MJCF file.
 
 namespace {
 
+// Of a tendon that is a straight line between two sites on different bodies; empty for others.
+std::optional<DistanceDrive> LegOf(int tendon, const MjcfImport& in) {
+  const mjModel& m = in.m;
+  const int first = m.tendon_adr[tendon];
+  if (m.tendon_num[tendon] != 2 || m.wrap_type[first] != mjWRAP_SITE ||
+      m.wrap_type[first + 1] != mjWRAP_SITE) {
+    return std::nullopt;
+  }
+  const int from = m.wrap_objid[first], to = m.wrap_objid[first + 1];
+  const DistanceDrive leg{.body_from = in.body_of[static_cast<size_t>(m.site_bodyid[from])],
+                          .p_from = VecAt(m.site_pos + 3 * from),
+                          .body_to = in.body_of[static_cast<size_t>(m.site_bodyid[to])],
+                          .p_to = VecAt(m.site_pos + 3 * to)};
+  return leg.body_from == leg.body_to ? std::nullopt : std::optional(leg);
+}
+
 void AddDrive(int u, MjcfImport* in) {
   const mjModel& m = in->m;
   const std::string name = in->NameOf(mjOBJ_ACTUATOR, u, "actuator");
+  const int tendon = m.actuator_trntype[u] == mjTRN_TENDON ? m.actuator_trnid[2 * u] : -1;
+  if (const auto leg = tendon >= 0 ? LegOf(tendon, *in) : std::nullopt) {
+    if (!in->driven_tendons.insert(tendon).second) return;
+    if (m.actuator_gear[6 * u] != 1.0) in->geared.push_back(name);
+    Drive drive{.name = name, .kind = *leg, .range = {}};
+    if (m.tendon_limited[tendon] != 0 && !in->LimitsAreOff()) {
+      drive.range = {m.tendon_range[2 * tendon], m.tendon_range[2 * tendon + 1]};
+    }
+    in->mechanism.drives.push_back(drive);
+    return;
+  }
   const int type = m.actuator_trntype[u];
   const bool on_joint = type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT;
   const int j = on_joint ? in->joint_of[static_cast<size_t>(m.actuator_trnid[2 * u])] : -1;
@@ -150,8 +266,10 @@ void AddDrive(int u, MjcfImport* in) {
     return;
   }
   std::vector<Drive>& drives = in->mechanism.drives;
-  const bool second = std::ranges::any_of(
-      drives, [j](const Drive& drive) { return std::get<JointDrive>(drive.kind).joint == j; });
+  const bool second = std::ranges::any_of(drives, [j](const Drive& drive) {
+    const auto* on = std::get_if<JointDrive>(&drive.kind);
+    return on != nullptr && on->joint == j;
+  });
   if (second) return;
   if (m.actuator_gear[6 * u] != 1.0) in->geared.push_back(name);
   drives.push_back({.name = name,
@@ -192,7 +310,26 @@ void AddElementsOf(int j, MjcfImport* in) {
 
 }  // namespace
 
+// A spring and damper between two sites.
+void AddSpring(int tendon, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const auto leg = LegOf(tendon, *in);
+  const double stiffness = m.tendon_stiffness[tendon], damping = m.tendon_damping[tendon];
+  const bool acts = stiffness != 0.0 || damping != 0.0;
+  if (!leg || !acts || in->IsOff(mjDSBL_PASSIVE)) return;
+  in->sprung_tendons.insert(tendon);
+  in->mechanism.springs.push_back({.name = in->NameOf(mjOBJ_TENDON, tendon, "tendon"),
+                                   .body_from = leg->body_from,
+                                   .p_from = leg->p_from,
+                                   .body_to = leg->body_to,
+                                   .p_to = leg->p_to,
+                                   .stiffness = stiffness,
+                                   .damping = damping,
+                                   .free_length_m = m.tendon_lengthspring[tendon]});
+}
+
 void AddElements(MjcfImport* in) {
+  for (int t = 0; t < in->m.ntendon; ++t) AddSpring(t, in);
   for (int j = 0; j < in->m.njnt; ++j) {
     if (IsScalar(in->m, j)) AddElementsOf(j, in);
   }
@@ -281,7 +418,14 @@ bool AddSides(int e, Coupling* coupling, MjcfImport* in) {
 
 void AddCoupling(int e, const std::string& name, MjcfImport* in) {
   Coupling coupling{.name = name, .terms = {}};
-  if (!AddSides(e, &coupling, in)) {
+  const mjModel& m = in->m;
+  if (m.eq_type[e] == mjEQ_TENDON && m.eq_obj2id[e] < 0 &&
+      in->driven_tendons.contains(m.eq_obj1id[e])) {
+    in->Say(
+        fmt::format("equality '{}', which holds tendon '{}' alone, is left out: its drive holds "
+                    "the tendon",
+                    name, in->NameOf(mjOBJ_TENDON, m.eq_obj1id[e], "tendon")));
+  } else if (!AddSides(e, &coupling, in)) {
     const char* element = in->m.eq_type[e] == mjEQ_JOINT ? "equality/joint" : "equality/tendon";
     in->LeaveOut(element, "",
                  fmt::format("equality '{}' (couplings are known of hinges and slides, by a "
@@ -331,24 +475,14 @@ namespace {
 
 constexpr size_t kMost = 6;  // names that are reported
 
-// Joints with several coordinates of which a number that acts on forces is not zero.
-std::vector<std::string> BallsWith(const MjcfImport& in, const mjtNum* per_dof) {
-  std::vector<std::string> names;
-  for (int d = 0; d < in.m.nv; ++d) {
-    const int j = in.m.dof_jntid[d];
-    const std::string name = in.JointNameOf(j);
-    const bool is_ball = in.m.jnt_type[j] == mjJNT_BALL;
-    if (per_dof[d] != 0.0 && is_ball && (names.empty() || names.back() != name)) {
-      names.push_back(name);
-    }
-  }
-  return names;
-}
-
-std::vector<std::string> BallsWhere(const MjcfImport& in, const auto& applies) {
+// Balls, or free joints that move, of which something holds.
+std::vector<std::string> JointsWhere(const MjcfImport& in, int type, const auto& applies) {
   std::vector<std::string> names;
   for (int j = 0; j < in.m.njnt; ++j) {
-    if (in.m.jnt_type[j] == mjJNT_BALL && applies(j)) names.push_back(in.JointNameOf(j));
+    if (in.m.jnt_type[j] != type || (type == mjJNT_FREE && !in.moves[static_cast<size_t>(j)])) {
+      continue;
+    }
+    if (applies(j)) names.push_back(in.JointNameOf(j));
   }
   return names;
 }
@@ -361,21 +495,31 @@ void LeaveOutOf(const char* element, const char* attribute, const char* what,
                            joints.size() == 1 ? "" : "s", Joined(joints, kMost)));
 }
 
-void LeaveOutBalls(MjcfImport* in) {
+void LeaveOutBallsAndFree(MjcfImport* in) {
   const mjModel& m = in->m;
-  LeaveOutOf("ball", "armature", "armature", BallsWith(*in, m.dof_armature), in);
-  if (!in->FrictionIsOff()) {
-    LeaveOutOf("ball", "frictionloss", "friction loss", BallsWith(*in, m.dof_frictionloss), in);
+  const auto any = [&m](const mjtNum* per_dof, int dofs) {
+    return [=, &m](int j) {
+      const mjtNum* first = per_dof + m.jnt_dofadr[j];
+      return std::any_of(first, first + dofs, [](mjtNum x) { return x != 0.0; });
+    };
+  };
+  for (const auto& [type, dofs, element] :
+       {std::tuple(mjJNT_BALL, 3, "ball"), {mjJNT_FREE, 6, "free"}}) {
+    const auto leave_out = [&, type = type, element = element](
+                               const char* attribute, const char* what, const auto& applies) {
+      LeaveOutOf(element, attribute, what, JointsWhere(*in, type, applies), in);
+    };
+    leave_out("armature", "armature", any(m.dof_armature, dofs));
+    if (!in->FrictionIsOff()) {
+      leave_out("frictionloss", "friction loss", any(m.dof_frictionloss, dofs));
+    }
+    if (in->IsOff(mjDSBL_PASSIVE)) continue;
+    leave_out("damping", "damping", any(m.dof_damping, dofs));
+    leave_out("stiffness", "stiffness", [&](int j) { return m.jnt_stiffness[j] != 0.0; });
   }
-  if (!in->IsOff(mjDSBL_PASSIVE)) {
-    LeaveOutOf("ball", "damping", "damping", BallsWith(*in, m.dof_damping), in);
-    LeaveOutOf("ball", "stiffness", "stiffness",
-               BallsWhere(*in, [&](int j) { return m.jnt_stiffness[j] != 0.0; }), in);
-  }
-  if (!in->LimitsAreOff()) {
-    LeaveOutOf("ball", "range", "the range",
-               BallsWhere(*in, [&](int j) { return m.jnt_limited[j] != 0; }), in);
-  }
+  if (in->LimitsAreOff()) return;
+  LeaveOutOf("ball", "range", "the range",
+             JointsWhere(*in, mjJNT_BALL, [&](int j) { return m.jnt_limited[j] != 0; }), in);
 }
 
 void LeaveOutFluid(MjcfImport* in) {
@@ -393,15 +537,22 @@ void LeaveOutFluid(MjcfImport* in) {
 
 void LeaveOutTendons(MjcfImport* in) {
   const mjModel& m = in->m;
-  const size_t tendons = static_cast<size_t>(m.ntendon) - in->coupling_tendons.size();
+  int tendons = 0;  // that do nothing
+  for (int t = 0; t < m.ntendon; ++t) {
+    for (const auto* used : {&in->coupling_tendons, &in->driven_tendons, &in->sprung_tendons}) {
+      if (used->contains(t)) --tendons;
+    }
+    ++tendons;
+  }
   bool acts = false;
   for (int t = 0; t < m.ntendon; ++t) {
-    const bool passive = !in->IsOff(mjDSBL_PASSIVE);
+    const bool passive = !in->IsOff(mjDSBL_PASSIVE) && !in->sprung_tendons.contains(t);
     const std::pair<const char*, bool> kinds[] = {
         {"stiffness", passive && m.tendon_stiffness[t] != 0.0},
         {"damping", passive && m.tendon_damping[t] != 0.0},
         {"frictionloss", !in->FrictionIsOff() && m.tendon_frictionloss[t] != 0.0},
-        {"range", !in->LimitsAreOff() && m.tendon_limited[t] != 0}};
+        {"range",
+         !in->LimitsAreOff() && m.tendon_limited[t] != 0 && !in->driven_tendons.contains(t)}};
     for (const auto& [attribute, is_there] : kinds) {
       if (!is_there) continue;
       acts = true;
@@ -455,11 +606,16 @@ void MjcfImport::LeaveOut(const char* element, const char* attribute, const std:
 
 void WarnWhatIsLost(MjcfImport* in) {
   LeaveOutFluid(in);
-  LeaveOutBalls(in);
+  LeaveOutBallsAndFree(in);
   LeaveOutOf("hinge or slide", "damping", "the negative damping", in->driving, in);
   LeaveOutTendons(in);
   if (!in->held.empty()) {
     in->LeaveOut("body/freejoint", "", "the free joint of " + Joined(in->held, kMost));
+  }
+  if (!in->carried.empty()) {
+    in->Say(fmt::format("{} free to move: loops carry what the file has on {}",
+                        Joined(in->carried, kMost) + (in->carried.size() == 1 ? " is" : " are"),
+                        in->carried.size() == 1 ? "a free joint" : "free joints"));
   }
   WarnNames(*in, "the gears of these actuators are left out: ", in->geared,
             "positions and forces are those of the joint, not of the motor");

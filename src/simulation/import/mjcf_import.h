@@ -36,6 +36,7 @@ struct MjcfImport {
   const mjcf::ForeignMjcf& foreign;
   const std::string& file;
   Diagnostics* diagnostics;
+  const std::string& base;  ///< the body that is to be held, by option; "" leaves the choice
 
   const mjtNum* qpos = nullptr;  ///< pose of the file: the first keyframe's, or the reference
   Mechanism mechanism = {};
@@ -45,14 +46,24 @@ struct MjcfImport {
 
   std::vector<ModelCaveat> left_out = {};  ///< what acts on forces and is not in the mechanism
 
+  /// Per joint of MuJoCo: a free one whose body is carried by its loops, and not held.
+  std::vector<bool> moves = {};
+  /// Body of MuJoCo that is held in the place of the free body at the root of its tree, or -1.
+  int held_inside = -1;
+
   // What the findings at the end report.
-  std::vector<std::string> held = {}, geared = {}, shifted = {}, moved = {};
+  std::vector<std::string> held = {}, carried = {}, geared = {}, shifted = {}, moved = {};
   std::vector<std::string> driving = {};  ///< joints whose damping is negative
   std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
+  std::set<int> driven_tendons = {};      ///< between two sites, with a drive
+  std::set<int> sprung_tendons = {};      ///< between two sites, as springs
   bool touching = false;                  ///< geoms would touch each other
 
   void Say(const std::string& text, const std::string& hint = "") const {
     diagnostics->Add({Severity::kWarning, file, 0, 0, text, hint});
+  }
+  void Refuse(const std::string& text, const std::string& hint) const {
+    diagnostics->Add({Severity::kError, file, 0, 0, text, hint});
   }
   /// Leaves out what a row of foreign_rows.h is about; `what` names it. The effect is the row's.
   void LeaveOut(const char* element, const char* attribute, const std::string& what);
@@ -82,14 +93,17 @@ struct MjcfImport {
 
 // In this order, each needs those before.
 
-/// Bodies, and the joints that carry them; free bodies are held.
+/// Which bodies on free joints are held: of those that closures tie together one, `base` or the
+/// first; none that they tie to the world. An error if there is no such base.
+void ChooseHeld(MjcfImport* in);
+/// Bodies, and the joints that carry them.
 void AddTree(MjcfImport* in);
+/// Actuators on hinges, slides and tendons between two sites.
+void AddDrives(MjcfImport* in);
 /// Closures, and couplings of joints.
 void AddEqualities(MjcfImport* in);
 /// Armature, damping, dry friction and springs of hinges and slides.
 void AddElements(MjcfImport* in);
-/// Actuators on hinges and slides.
-void AddDrives(MjcfImport* in);
 /// Sites as frames, geoms and mesh files as shapes.
 void AddSites(MjcfImport* in);
 void AddShapes(MjcfImport* in);

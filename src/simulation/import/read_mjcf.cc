@@ -10,12 +10,13 @@ namespace simulation {
 namespace {
 
 ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
-                    Diagnostics* diagnostics) {
+                    const std::string& base, Diagnostics* diagnostics) {
   ImportedMjcf imported;
   imported.text = foreign.Text();
+  imported.printed = RoundingOf(imported.text);
   imported.model = CompileMjcf(imported.text);
   const mjModel& m = *imported.model;
-  MjcfImport in{.m = m, .foreign = foreign, .file = file, .diagnostics = diagnostics};
+  MjcfImport in{.m = m, .foreign = foreign, .file = file, .diagnostics = diagnostics, .base = base};
   in.mechanism.name = foreign.ModelName();
   in.mechanism.file = file;
   in.left_out = foreign.left_out();
@@ -23,10 +24,11 @@ ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
   if (in.mechanism.gravity_W.norm() > 0.0) {
     in.mechanism.up_W = -in.mechanism.gravity_W.normalized();
   }
+  ChooseHeld(&in);
   AddTree(&in);
+  AddDrives(&in);
   AddEqualities(&in);
   AddElements(&in);
-  AddDrives(&in);
   AddSites(&in);
   AddShapes(&in);
   WarnWhatIsLost(&in);
@@ -45,6 +47,7 @@ ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
 }  // namespace
 
 std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::string& file,
+                                       const std::string& base,
                                        const std::vector<std::string>& warnings,
                                        Diagnostics* diagnostics) {
   mjcf::ForeignMjcf foreign(text, file, diagnostics);
@@ -52,10 +55,11 @@ std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::strin
   constexpr int kMostRounds = 200;
   for (int round = 0; round < kMostRounds; ++round) {
     try {
-      ImportedMjcf imported = Import(foreign, file, diagnostics);
+      ImportedMjcf imported = Import(foreign, file, base, diagnostics);
       for (const std::string& warning : warnings) {
         diagnostics->Add({Severity::kWarning, file, 0, 0, "MuJoCo: " + warning, ""});
       }
+      if (diagnostics->has_errors()) return std::nullopt;
       return imported;
     } catch (const EngineError& error) {
       if (foreign.DropWhatIsUnknown(error.what())) continue;
@@ -70,12 +74,13 @@ std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::strin
 }  // namespace simulation
 
 std::optional<MjcfModel> ReadMjcf(const std::string& text, const std::string& file,
-                                  Diagnostics* diagnostics) {
+                                  const std::string& base, Diagnostics* diagnostics) {
   std::vector<std::string> warnings;
   const simulation::EngineSession session(&warnings);
-  auto imported = simulation::ImportMjcf(text, file, warnings, diagnostics);
+  auto imported = simulation::ImportMjcf(text, file, base, warnings, diagnostics);
   if (!imported) return std::nullopt;
-  return MjcfModel{std::move(imported->mechanism), std::move(imported->left_out)};
+  return MjcfModel{std::move(imported->mechanism), std::move(imported->left_out),
+                   imported->printed};
 }
 
 }  // namespace mbv

@@ -417,7 +417,27 @@ struct ForeignMjcf::Impl {
         if (*end == '\0' || end == text) continue;
         e->SetAttribute(attribute, std::string(text, static_cast<const char*>(end)).c_str());
       }
+      TakeOneLength(e, lost);
     }
+  }
+
+  // MuJoCo 3: between two lengths the spring of a tendon exerts no force.
+  static void TakeOneLength(XMLElement* e, Losses* lost) {
+    const char* text = e->Attribute("springlength");
+    double lengths[2] = {};
+    char* end = nullptr;
+    if (text == nullptr) return;
+    lengths[0] = std::strtod(text, &end);
+    const char* const second = end;
+    lengths[1] = std::strtod(second, &end);
+    if (end == second) return;  // one length, or for the compiler to refuse
+    if (lengths[0] == lengths[1]) {
+      e->SetAttribute("springlength", lengths[0]);
+      return;
+    }
+    Note(e, "springlength", "2nd", lost);
+    e->DeleteAttribute("springlength");
+    e->SetAttribute("stiffness", 0);
   }
 
   static std::string Described(const std::pair<std::string, std::string>& what, const Loss& loss) {

@@ -14,6 +14,7 @@ constexpr const char* kFluid = "a fluid drags and lifts every body";
 constexpr const char* kPlugin = "a plugin may exert forces of any kind";
 constexpr const char* kActuatorLost = "the drive and its forces are missing";
 constexpr const char* kOfBall = "it exerts moments in the ball";
+constexpr const char* kOfFree = "it pushes the floating body";
 constexpr const char* kFlex = "a flexible body with its mass and elasticity is missing";
 constexpr const char* kMoreThanLinear = "the spring or damper is not linear";
 constexpr const char* kShape = "the parts of the composite are somewhere else";
@@ -97,8 +98,13 @@ const ForeignRow kRows[] = {
     {"ball", "frictionloss", kLeftOut, kOfBall, "0", true},
     {"ball", "armature", kLeftOut, kOfBall, "0", true},
     {"ball", "range", kLeftOut, "the ball is stopped at its limit", "", true},
+    {"free", "armature", kLeftOut, kOfFree, "0", true},
+    {"free", "frictionloss", kLeftOut, kOfFree, "0", true},
+    {"free", "damping", kLeftOut, kOfFree, "0", true},
+    {"free", "stiffness", kLeftOut, kOfFree, "0", true},
     {"hinge or slide", "damping", kLeftOut, "a negative damper drives the joint", "0", true},
     {"stiffness", "2nd", kLeftOut, kMoreThanLinear, "0"},
+    {"springlength", "2nd", kLeftOut, "the tendon pulls outside a band of lengths"},
     {"damping", "2nd", kLeftOut, kMoreThanLinear, "0"},
     {"body/freejoint", "", kLeftOut, "the body is held where it is", "", true},
     {"body/freejoint", "name", kTaken},
@@ -168,14 +174,14 @@ const ForeignRow kRows[] = {
     {"equality/flexvert", "*", kNoForce},
     {"equality/flexstrain", "*", kNoForce},
 
-    {"tendon/spatial", "name class", kTaken},
+    {"tendon/spatial", "name class springlength", kTaken},
     {"tendon/spatial", "group actuatorfrclimited actuatorfrcrange solreflimit solimplimit "
-                       "solreffriction solimpfriction width material margin rgba user springlength",
+                       "solreffriction solimpfriction width material margin rgba user",
      kNoForce},
     {"tendon/spatial", "armature", kLeftOut, "the tendon's inertia takes part in every motion", "0"},
-    {"tendon/fixed", "name class", kTaken},
+    {"tendon/fixed", "name class springlength", kTaken},
     {"tendon/fixed", "group actuatorfrclimited actuatorfrcrange solreflimit solimplimit "
-                     "solreffriction solimpfriction margin user springlength", kNoForce},
+                     "solreffriction solimpfriction margin user", kNoForce},
     {"tendon/fixed", "armature", kLeftOut, "the tendon's inertia takes part in every motion", "0"},
     {"tendon/spatial", "stiffness damping frictionloss", kLeftOut, "the tendon pulls", "0", true},
     {"tendon/fixed", "stiffness damping frictionloss", kLeftOut, "the tendon pulls", "0", true},
