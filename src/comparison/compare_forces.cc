@@ -347,13 +347,15 @@ void CompareOwn(const ComparisonInput& input, const ForceScale& scale,
     const auto joint = static_cast<size_t>(error.joint - input.mechanism->joints.data());
     const double turned = scales[joint].moment_Nm;
     const double local = std::max(scales[joint].force_N, kMomentArm * turned / scale.length_m);
-    const double least = std::max(ForceScale::kIdle * local, roundoff);
+    // A massless end bears what a simulation's stand-in for its mass weighs.
+    const double of_mass = local > 0.0 ? local : OrZero(all.rms_truth());
+    const double least = std::max(ForceScale::kIdle * of_mass, roundoff);
     if (error.force.count() > 0) {
       KeepWorst(&pair->metrics, Metric::kReactionOwn, error.force.MeasuredNrmse(least));
     }
     if (error.moment.count() == 0) continue;
     const double floor =
-        std::max(OrZero(error.force.rms_truth()), local) * kMomentArm * scale.length_m;
+        std::max(OrZero(error.force.rms_truth()), of_mass) * kMomentArm * scale.length_m;
     KeepWorst(&pair->metrics, Metric::kReactionOwn,
               error.moment.MeasuredNrmse(
                   std::max({floor, roundoff * scale.length_m, ForceScale::kIdle * turned})));

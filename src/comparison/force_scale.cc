@@ -94,6 +94,7 @@ class Scales {
     FindCarries(heaviest);
     FindForce();
     if (!scale_.acts) TakeRound();
+    TakeMassless();
     for (size_t b = 0; b < bodies_.size(); ++b) {
       scale_.acceleration.push_back(bodies_[b].acceleration);
       scale_.moment.push_back(MomentOf(b));
@@ -289,6 +290,24 @@ class Scales {
       if (!IsCompared(k)) continue;
       double& of_unit = scale_.of_unit[ForceUnit(mechanism_, mechanism_.drives[k])];
       of_unit = std::max(of_unit, scale_.driven[k]);
+    }
+  }
+
+  // What moves no mass needs no force. A simulation gives it 1e-11 of the mass of all, which is no
+  // part of the mechanism: what that takes is no error, on the scale of all.
+  void TakeMassless() {
+    for (size_t k = 0; k < mechanism_.drives.size(); ++k) {
+      bool moves_mass = scale_.driven[k] > 0.0, moves = false;
+      for (size_t b = 1; b < bodies_.size(); ++b) {
+        const Body& body = mechanism_.bodies[b];
+        const bool massless = body.mass == 0.0 && body.I_Bcm_B.isZero(0.0);
+        const bool moved = Size(k, b) > kRoundoff;
+        moves = moves || moved;
+        moves_mass = moves_mass || (moved && !massless);
+      }
+      if (!moves || moves_mass) continue;
+      const bool is_force = ForceUnit(mechanism_, mechanism_.drives[k]) == "N";
+      scale_.driven[k] = scale_.force_N * (is_force ? 1.0 : scale_.length_m);
     }
   }
 

@@ -112,11 +112,29 @@ std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
 
 namespace {
 
+constexpr double kStill = 1e-7;  // a gradient of what cannot move: rounding
+
 Command HeldAt(const Coordinate& coordinate) {
   return {.name = "", .terms = {{coordinate, 1.0}}, .profile = {}};
 }
 
 }  // namespace
+
+std::vector<size_t> StuckDrives(const Mechanism& mechanism) {
+  const BodyStates home = HomeStates(mechanism);
+  const MatX motion = FindRank(HeldRows(mechanism, home).Matrix(), NullSpaces::kMotion).motion;
+  RowStack rows(mechanism.bodies.size(), CharacteristicLength(mechanism));
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    AddCommand(mechanism, home, HeldAt({Coordinate::Kind::kDrive, static_cast<int>(d), 0}), &rows);
+  }
+  std::vector<size_t> stuck;
+  if (mechanism.drives.empty()) return stuck;
+  const VecX lengths = (rows.Matrix() * motion).rowwise().norm();
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    if (!(lengths[static_cast<Eigen::Index>(d)] > kStill)) stuck.push_back(d);
+  }
+  return stuck;
+}
 
 CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                    const std::vector<Coordinate>& candidates, size_t preferred) {
@@ -138,7 +156,7 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
   };
   for (size_t k = 0; k < preferred && choice.left() >= 0; ++k) {
     const auto row = static_cast<Eigen::Index>(k);
-    if (gradients.row(row).norm() > kIndependent * std::max(lengths[row], kIndependent)) {
+    if (gradients.row(row).norm() > std::max(kIndependent * lengths[row], kStill)) {
       take(row);
     } else {
       choice.dependent.push_back(k);

@@ -44,6 +44,9 @@ struct CoordinateChoice {
                                                  const std::vector<Coordinate>& candidates,
                                                  size_t preferred);
 
+/// Drives that cannot move at home, by index.
+[[nodiscard]] std::vector<size_t> StuckDrives(const Mechanism& mechanism);
+
 /// A DOF that stays when these coordinates are held: twists [ω; v] per body, world axes, the
 /// largest entry 1. Empty if none stays.
 [[nodiscard]] std::vector<Vec6> FreeMotion(const Mechanism& mechanism,

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "base/demand.h"
 #include "kinematics/constraints.h"
 #include "math/sparse.h"
 
@@ -177,17 +178,30 @@ struct PartRank {
   MatX all_vectors;  // with theirs
 };
 
-PartRank SingularValuesOf(const MatX& J, NullSpaces wanted) {
-  const unsigned options = wanted == NullSpaces::kSelfStress ? Eigen::ComputeFullU
-                           : wanted == NullSpaces::kMotion   ? Eigen::ComputeFullV
-                                                             : 0;
-  const Eigen::BDCSVD<MatX> svd(J, options);
+// Empty where the decomposition failed.
+template <typename Svd>
+std::optional<PartRank> PartOf(const Svd& svd, NullSpaces wanted) {
   PartRank part;
   part.singular = svd.singularValues();
   part.largest = part.singular.size() == 0 ? 0.0 : part.singular[0];
   if (wanted == NullSpaces::kSelfStress) part.all_vectors = svd.matrixU();
   if (wanted == NullSpaces::kMotion) part.all_vectors = svd.matrixV();
-  return part;
+  const bool good =
+      svd.info() == Eigen::Success && part.singular.allFinite() && part.all_vectors.allFinite();
+  return good ? std::optional(std::move(part)) : std::nullopt;
+}
+
+PartRank SingularValuesOf(const MatX& J, NullSpaces wanted) {
+  MBV_DEMAND(J.allFinite(), "rows of constraints");
+  const unsigned options = wanted == NullSpaces::kSelfStress ? Eigen::ComputeFullU
+                           : wanted == NullSpaces::kMotion   ? Eigen::ComputeFullV
+                                                             : 0;
+  if (auto part = PartOf(Eigen::BDCSVD<MatX>(J, options), wanted)) return *std::move(part);
+  // Eigen's divide and conquer makes NaN of some matrices; this is slower by far.
+  auto part =
+      PartOf(Eigen::JacobiSVD<MatX, Eigen::FullPivHouseholderQRPreconditioner>(J, options), wanted);
+  MBV_DEMAND(part.has_value(), "singular values");
+  return *std::move(part);
 }
 
 // With singular values, what lies above `limit` counts.

@@ -101,4 +101,13 @@ std::string TriangleViolation(const Body& body) {
   return PrincipalInertiaText(principal) + " violate I1 + I2 >= I3";
 }
 
+std::string ImpossibleInertia(const Body& body) {
+  if (body.I_Bcm_B.isZero(0.0)) {
+    return body.mass == 0.0 ? "" : fmt::format("mass = {} without inertia", body.mass);
+  }
+  const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B).eigenvalues();
+  if (!(principal[0] > 0.0)) return PrincipalInertiaText(principal) + " violate I > 0";
+  return TriangleViolation(body);
+}
+
 }  // namespace mbv

@@ -703,7 +703,13 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
                                      .signals = s.signals,
                                      .urdf_joints = s.urdf.joints};
   internal::ModelReport report(places, &reading->yaml, &reading->others, &reading->caveats);
-  internal::CheckMasses(*mechanism, s.head.impossible_inertia_allowed, &report);
+  const std::string& file = reading->yaml.file();
+  const bool is_robot = internal::IsUrdfFile(file) || file.ends_with(".xml");
+  internal::CheckMasses(*mechanism,
+                        s.head.impossible_inertia_allowed ? internal::Impossible::kAllowed
+                        : is_robot                        ? internal::Impossible::kOfRobot
+                                                          : internal::Impossible::kRefused,
+                        &report);
   if (s.beams.good) internal::CheckBeams(*mechanism, &report);
   // With a broken joint, findings about the graph would only be its consequences; with a broken
   // number, those about the loops.
@@ -714,7 +720,7 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
       {.tolerance_m = std::isfinite(by_option_m) ? by_option_m : s.head.closure_tolerance_m,
        .printed = std::isfinite(by_option_m) ? PrintedRounding{} : reading->printed,
        .bare_urdf = reading->bare_urdf,
-       .is_robot = !reading->yaml.file().ends_with(".yaml"),
+       .is_robot = is_robot,
        .assembly = reading->options.assembly,
        .guessed = s.joints.guessed},
       mechanism, &report);

@@ -62,25 +62,26 @@ namespace {
 // Beside larger ones, usual masses and lengths are lost in a sum.
 constexpr double kLargestMass_kg = 1e15;
 constexpr double kLargestLength_m = 1e12;
+constexpr double kRoundoff = 1e-9;         // of principal inertias
+constexpr double kLeastGyration_m = 1e-7;  // radius below which a body is a point
 
 struct Reason {
   std::string text;  // empty: nothing wrong
   std::string hint;
 };
 
-// Why no distribution of mass has this mass and inertia.
-Reason WhyNotPhysical(const Body& body) {
+// What no computation can take.
+Reason WhyUnusable(const Body& body) {
+  if (body.I_Bcm_B.isZero(0.0)) return {};
   if (body.mass == 0.0) {
-    if (body.I_Bcm_B.isZero(0.0)) return {};
     return {"an inertia without mass",
             "give the mass, or leave both out for a massless connecting piece"};
   }
-  if (body.I_Bcm_B.isZero(0.0)) {
-    return {fmt::format("mass = {} without inertia", body.mass),
-            "give the inertia about the centre of mass"};
-  }
   const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B).eigenvalues();
-  if (!(principal[0] > 0.0)) return {PrincipalInertiaText(principal) + " violate I > 0", ""};
+  if (principal[0] < -std::max(kRoundoff * std::abs(principal[2]),
+                               body.mass * kLeastGyration_m * kLeastGyration_m)) {
+    return {PrincipalInertiaText(principal) + " violate I > 0", ""};
+  }
   return {};
 }
 
@@ -143,27 +144,34 @@ void ReportTree(const Mechanism& mechanism, const SpanningTreeResult& tree, Mode
 
 }  // namespace
 
-void CheckMasses(const Mechanism& mechanism, bool impossible_allowed, ModelReport* report) {
+void CheckMasses(const Mechanism& mechanism, Impossible impossible, ModelReport* report) {
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
     if (!std::isfinite(body.mass)) continue;  // already reported
     Reason reason = WhyTooLarge(body);
-    if (reason.text.empty()) reason = WhyNotPhysical(body);
+    if (reason.text.empty()) reason = WhyUnusable(body);
     if (!reason.text.empty()) {
       report->AtBody(mechanism, b, Severity::kError, reason.text, reason.hint);
       continue;
     }
-    const std::string violation = TriangleViolation(body);
+    const std::string violation = ImpossibleInertia(body);
     if (violation.empty()) continue;
-    if (impossible_allowed) {
-      report->AtBody(
-          mechanism, b, Severity::kWarning,
-          report->Allow(fmt::format("impossible inertia of {}: {}", body.name, violation)), "");
-    } else {
-      report->AtBody(mechanism, b, Severity::kError, violation,
-                     "no distribution of mass has such inertias; look for exchanged or missing "
-                     "digits, and that they are about the centre of mass; `allow: "
-                     "impossible_inertia` in the model takes them as they are");
+    const std::string cause = body.I_Bcm_B.isZero(0.0)
+                                  ? "give the inertia about the centre of mass"
+                                  : "no distribution of mass has such inertias; look for exchanged "
+                                    "or missing digits, and "
+                                    "that they are about the centre of mass";
+    const std::string text = fmt::format("impossible inertia of {}: {}", body.name, violation);
+    switch (impossible) {
+      case Impossible::kAllowed:
+        report->AtBody(mechanism, b, Severity::kWarning, report->Allow(text), "");
+        break;
+      case Impossible::kOfRobot:
+        report->AtBody(mechanism, b, Severity::kWarning, text + ", taken as it is", cause);
+        break;
+      case Impossible::kRefused:
+        report->AtBody(mechanism, b, Severity::kError, violation,
+                       cause + "; `allow: impossible_inertia` in the model takes them as they are");
     }
   }
 }
@@ -406,21 +414,8 @@ bool TakeNamedBalls(Mechanism* mechanism, ModelReport* report) {
   return true;
 }
 
-std::string WhatWouldClose(const Mechanism& mechanism, const HomeResult& home) {
-  std::string text;
-  if (!home.gaps.empty()) {
-    const Joint& joint = mechanism.joints[home.gaps.front().joint];
-    const Pose X_FM = (mechanism.X_WB_home[joint.parent] * joint.X_PF).inverse() *
-                      (mechanism.X_WB_home[joint.child] * joint.X_CM);
-    const Vec3 d = X_FM.translation();
-    text = fmt::format(
-        "at the pose of least gaps the frame of '{}' on '{}' would have to move by [{:.4g}, "
-        "{:.4g}, "
-        "{:.4g}] m in its own axes",
-        joint.name, mechanism.bodies[joint.parent].name, d.x(), d.y(), d.z());
-  }
-  // Would points do where frames are welded?
-  Mechanism points = mechanism;
+bool TakeWeldsAsPoints(const HomeResult& home, Mechanism* mechanism, ModelReport* report) {
+  Mechanism points = *mechanism;
   std::vector<std::string> names;
   for (const LoopGap& gap : home.gaps) {
     Joint& joint = points.joints[gap.joint];
@@ -428,12 +423,31 @@ std::string WhatWouldClose(const Mechanism& mechanism, const HomeResult& home) {
     MakeBall(&joint);
     names.push_back(joint.name);
   }
-  if (!names.empty() && SolveHome(&points).closed) {
-    text +=
-        fmt::format("; all loops close where the welded frames (6d) meet in points only (3d): {}",
-                    Joined(names, 12));
-  }
-  return text;
+  if (names.empty()) return false;
+  const HomeResult closed = SolveHome(&points);
+  if (!closed.closed) return false;
+  *mechanism = std::move(points);
+  report->AddOther({Severity::kWarning, report->file(), 0, 0,
+                    report->LeaveOut(fmt::format(
+                        "the loops do not close where the file welds frames (6d), and "
+                        "close where these meet in points (3d): of {} their turn against "
+                        "each other is left out, and the moment that would hold it",
+                        Joined(names, 12))),
+                    "correct the frames, or write 3d in the closure file"});
+  if (closed.guesses_moved) WarnAboutAssembly(*mechanism, closed, report);
+  return true;
+}
+
+std::string WhatWouldClose(const Mechanism& mechanism, const HomeResult& home) {
+  if (home.gaps.empty()) return "";
+  const Joint& joint = mechanism.joints[home.gaps.front().joint];
+  const Pose X_FM = (mechanism.X_WB_home[joint.parent] * joint.X_PF).inverse() *
+                    (mechanism.X_WB_home[joint.child] * joint.X_CM);
+  const Vec3 d = X_FM.translation();
+  return fmt::format(
+      "at the pose of least gaps the frame of '{}' on '{}' would have to move by [{:.4g}, {:.4g}, "
+      "{:.4g}] m in its own axes",
+      joint.name, mechanism.bodies[joint.parent].name, d.x(), d.y(), d.z());
 }
 
 }  // namespace mbv::internal

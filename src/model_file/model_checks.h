@@ -34,9 +34,9 @@ class ModelReport {
               std::vector<ModelCaveat>* caveats)
       : places_(places), yaml_(*yaml), others_(*others), caveats_(*caveats) {}
 
-  /// What a robot's file has and the mechanism has not: as Allow().
+  /// What a robot's loops have and the mechanism has not: as Allow().
   [[nodiscard]] std::string LeaveOut(const std::string& text) {
-    caveats_.push_back({.kind = ModelCaveat::Kind::kLeftOut, .text = text, .source = "rounding"});
+    caveats_.push_back({.kind = ModelCaveat::Kind::kLeftOut, .text = text, .source = "closure"});
     return text;
   }
   /// What the model makes acceptable; the warning that says it, and a caveat of every verdict.
@@ -73,8 +73,11 @@ class ModelReport {
   std::vector<ModelCaveat>& caveats_;
 };
 
+/// What is made of inertias that no distribution of mass has: an error, a caveat of what the model
+/// allows, a warning about another one's file (its model file allows them then).
+enum class Impossible { kRefused, kAllowed, kOfRobot };
 /// Masses and inertias that no body has; impossible ones may be allowed.
-void CheckMasses(const Mechanism& mechanism, bool impossible_allowed, ModelReport* report);
+void CheckMasses(const Mechanism& mechanism, Impossible impossible, ModelReport* report);
 
 /// Beams of a body that hold together, and joints, legs and springs that sit on their ends.
 void CheckBeams(const Mechanism& mechanism, ModelReport* report);
@@ -112,6 +115,8 @@ void CheckPlausible(const Mechanism& mechanism, ModelReport* report);
 void WarnAboutAssembly(const Mechanism& mechanism, const HomeResult& home, ModelReport* report);
 /// Makes hinges balls that are named so, if that closes the loops; false if not.
 bool TakeNamedBalls(Mechanism* mechanism, ModelReport* report);
+/// The same for closures that weld frames: as balls, with a caveat.
+bool TakeWeldsAsPoints(const HomeResult& home, Mechanism* mechanism, ModelReport* report);
 /// One sentence for those who state closures in a URDF file.
 [[nodiscard]] std::string WhatWouldClose(const Mechanism& mechanism, const HomeResult& home);
 

@@ -9,8 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/text.h"
 #include "kinematics/assembly.h"
 #include "kinematics/closure_residual.h"
+#include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
@@ -51,11 +53,14 @@ constexpr double kLeastDamping = 1e-12;  // over the residual
 
 // How frames are moved. Beyond singular poses rounding adds up without bound: then those nearer
 // home come first. Paradoxical loops need damped steps, which move frames farther than others do.
+enum class Steps { kClear, kClearThenDamped, kDamped };
 struct Way {
   std::vector<double> reaches;
-  bool damped = false;
+  Steps steps = Steps::kClear;
 };
-const std::array<Way, 3> kWays = {{{{kReach}}, {{0.6, kReach}}, {{kReach}, true}}};
+const std::array<Way, 3> kWays = {{{{kReach}, Steps::kClear},
+                                   {{0.6, kReach}, Steps::kClearThenDamped},
+                                   {{kReach}, Steps::kDamped}}};
 
 constexpr Eigen::Index kMostUnknowns = 800;
 
@@ -76,12 +81,12 @@ double RankTolerance(double gap) { return std::max(internal::kRankTolerance, kGa
 
 class Projector {
  public:
-  Projector(const Mechanism& mechanism, double gap, double reach, bool damped)
+  Projector(const Mechanism& mechanism, double gap, double reach, Steps steps)
       : mechanism_(mechanism),
         length_(CharacteristicLength(mechanism)),
         tree_(mechanism_, std::vector<bool>(mechanism.joints.size(), false)),
         frames_(static_cast<Eigen::Index>(12 * mechanism.joints.size())),
-        damped_(damped),
+        steps_(steps),
         xi_(VecX::Zero(frames_)) {
     unit_.setOnes(tree_.dofs());
     for (int c = 0; c < tree_.dofs(); ++c) {
@@ -105,7 +110,10 @@ class Projector {
     VecX r = Evaluate(poses_, &J);
     double mu = kLeastDamping;
     for (int i = 0; i < 60 && r.lpNorm<Eigen::Infinity>() > 1e-15; ++i) {
-      if (!(damped_ ? StepDamped(J, r, &mu) : StepWhereClear(J, r))) break;
+      if (!(steps_ != Steps::kDamped && StepWhereClear(J, r)) &&
+          !(steps_ != Steps::kClear && StepDamped(J, r, &mu))) {
+        break;
+      }
       r = Evaluate(poses_, &J);
     }
     return r.lpNorm<Eigen::Infinity>() < 1e-12;
@@ -315,7 +323,7 @@ class Projector {
   const double length_;
   const TreeMotion tree_;
   const Eigen::Index frames_;
-  const bool damped_;
+  const Steps steps_;
   VecX xi_, unit_;
   std::vector<Pose> given_;               // X_PF, X_CM of each joint
   std::vector<std::vector<Pose>> poses_;  // X_FM per joint
@@ -348,7 +356,7 @@ DataProjection ProjectData(Mechanism* mechanism, double gap, const Way& way) {
     double moved_m = 0.0, turned_rad = 0.0;
     Mechanism moved = part;
     for (const double reach : way.reaches) {
-      Projector projector(moved, part_gap, reach, way.damped);
+      Projector projector(moved, part_gap, reach, way.steps);
       if (projector.unknowns() > kMostUnknowns) return projection;
       if (!projector.IsRounded()) break;
       if (!projector.Solve()) return projection;
@@ -410,24 +418,27 @@ bool Project(const ClosureRules& rules, double gap, const std::string& why, Mech
         "joint frames moved by up to {:.2g} m and {:.2g} rad, because the loops are "
         "overconstrained by {} and {}",
         projection.moved_m, projection.turned_rad, projection.redundant, why);
-    const std::string tolerance = fmt::format("{:.2g} m", rules.tolerance_m);
-    report->AtFile(
-        Severity::kWarning,
-        rules.is_robot
-            ? report->LeaveOut(fmt::format(
-                  "rounding of the file's numbers: {} ({} {})", text,
-                  rules.printed.explains() ? "their digits explain" : "--closure-tolerance",
-                  tolerance))
-            : report->Allow(fmt::format("{} (closure_tolerance {})", text, tolerance)));
+    report->AtFile(Severity::kWarning,
+                   rules.is_robot ? report->LeaveOut("rounding of the file's numbers: " + text)
+                                  : report->Allow(fmt::format("{} (closure_tolerance {:.2g} m)",
+                                                              text, rules.tolerance_m)));
     return true;
   }
   return false;
 }
 
+// What a robot is allowed.
+std::string Licence(const ClosureRules& rules) {
+  if (!rules.is_robot) return "";
+  return fmt::format(" ({} {:.2g} m)",
+                     rules.printed.explains() ? "their digits explain" : "--closure-tolerance",
+                     rules.tolerance_m);
+}
+
 // Rounded loops may close at home and yet not move. How much of a tolerance the rounding takes is
 // not known: less of it leaves more rows independent.
-void ProjectLoopsThatCannotMove(const ClosureRules& rules, Mechanism* mechanism,
-                                ModelReport* report) {
+bool ProjectLoopsThatCannotMove(const ClosureRules& rules, const std::string& why,
+                                Mechanism* mechanism, ModelReport* report) {
   constexpr int kTries = 4;
   double gap = rules.tolerance_m / CharacteristicLength(*mechanism);
   int tried = 0;  // constraints that were redundant
@@ -435,10 +446,22 @@ void ProjectLoopsThatCannotMove(const ClosureRules& rules, Mechanism* mechanism,
     const int redundant = CountNearlyRedundant(*mechanism, gap);
     if (redundant == tried) continue;
     tried = redundant;
-    if (Project(rules, gap, "their data let them move except for rounding", mechanism, report)) {
-      return;
-    }
+    if (Project(rules, gap, why, mechanism, report)) return true;
   }
+  return false;
+}
+
+// A robot's drive that cannot move has loops that were drawn not quite alike.
+void FreeStuckDrives(const ClosureRules& given, Mechanism* mechanism, ModelReport* report) {
+  constexpr double kDrawn = 1e-3;  // characteristic lengths; frames move by ten times that
+  if (!given.is_robot || !given.printed.explains()) return;
+  std::vector<std::string> names;
+  for (const size_t d : StuckDrives(*mechanism)) names.push_back(mechanism->drives[d].name);
+  if (names.empty()) return;
+  ClosureRules rules = given;
+  rules.tolerance_m = kDrawn * CharacteristicLength(*mechanism);
+  (void)ProjectLoopsThatCannotMove(
+      rules, fmt::format("{} could not move otherwise", Joined(names, 4)), mechanism, report);
 }
 
 void ReportGaps(const ClosureRules& rules, const Mechanism& mechanism, const HomeResult& home,
@@ -646,7 +669,11 @@ void CloseLoops(const ClosureRules& given, Mechanism* mechanism, ModelReport* re
   const HomeResult home = SolveHome(mechanism, rules.assembly);
   if (!home.unmet.empty()) return ReportUnmet(*mechanism, home, report);
   if (home.closed) {
-    ProjectLoopsThatCannotMove(rules, mechanism, report);
+    if (!ProjectLoopsThatCannotMove(rules,
+                                    "their data let them move except for rounding" + Licence(rules),
+                                    mechanism, report)) {
+      FreeStuckDrives(rules, mechanism, report);
+    }
     if (home.guesses_moved) {
       WarnAboutAssembly(*mechanism, home, report);
     } else if (home.drives_moved) {
@@ -657,11 +684,15 @@ void CloseLoops(const ClosureRules& given, Mechanism* mechanism, ModelReport* re
   const double gap_m = home.gap * CharacteristicLength(*mechanism);
   const int redundant = CountNearlyRedundant(*mechanism, home.gap);
   if (redundant > 0 && gap_m <= rules.tolerance_m &&
-      Project(rules, home.gap, fmt::format("their data close them except for {:.2g} m", gap_m),
+      Project(rules, home.gap,
+              fmt::format("their data close them except for {:.2g} m", gap_m) + Licence(rules),
               mechanism, report)) {
     return;
   }
-  if (rules.bare_urdf && TakeNamedBalls(mechanism, report)) return;
+  if (rules.bare_urdf &&
+      (TakeNamedBalls(mechanism, report) || TakeWeldsAsPoints(home, mechanism, report))) {
+    return;
+  }
   std::string hint = "improve the guesses of the loop's joints, or look for a wrong length or axis";
   if (rules.bare_urdf) hint += "; " + WhatWouldClose(*mechanism, home);
   if (redundant > 0) {

@@ -25,6 +25,7 @@ namespace {
 inline constexpr double kNegligibleShare = 1e-6;
 /// A link without inertia, fixed to another one, counts as a mass point below this share.
 inline constexpr double kPointMassShare = 1e-3;
+constexpr double kInertiaRoundoff = 1e-12;  // of the terms of a sum
 
 void AddMass(const Body& part, const Pose& X_BP, Body* body) {
   if (part.mass == 0.0 && part.I_Bcm_B.isZero(0.0)) return;
@@ -33,9 +34,14 @@ void AddMass(const Body& part, const Pose& X_BP, Body* body) {
   Vec3 p = 0.5 * (body->p_BoBcm_B + p_part);
   if (mass > 0.0) p = (body->mass * body->p_BoBcm_B + part.mass * p_part) / mass;
   // Steiner's terms of both about the new centre of mass.
+  const double before = body->I_Bcm_B.norm();
   const Mat3 C_body = Skew(body->p_BoBcm_B - p), C_part = Skew(p_part - p);
   body->I_Bcm_B += X_BP.linear() * part.I_Bcm_B * X_BP.linear().transpose() -
                    body->mass * C_body * C_body - part.mass * C_part * C_part;
+  // Mass points that coincide leave round-off.
+  const double size = part.mass * C_part.squaredNorm() + body->mass * C_body.squaredNorm() +
+                      part.I_Bcm_B.norm() + before;
+  if (body->I_Bcm_B.norm() < kInertiaRoundoff * size) body->I_Bcm_B.setZero();
   body->mass = mass;
   body->p_BoBcm_B = p;
 }
@@ -55,8 +61,10 @@ struct MoveShape {
 
 class Folder {
  public:
-  Folder(const std::set<std::string>& keep, const std::vector<std::string>& motors, UrdfTree* tree)
-      : keep_(keep), motors_(motors), tree_(*tree) {
+  /// `bare`: no model file gives masses, or names joints.
+  Folder(const std::set<std::string>& keep, const std::vector<std::string>& motors, bool bare,
+         UrdfTree* tree)
+      : keep_(keep), motors_(motors), bare_(bare), tree_(*tree) {
     for (const Body& body : tree_.bodies) total_kg_ += body.mass;
     const size_t n = tree_.bodies.size();
     carrier_.resize(n);
@@ -149,7 +157,8 @@ class Folder {
 
   void FreezeLooseEnd(int b) {
     const Body& body = tree_.bodies[b];
-    if (joint_of_[b] < 0 || body.mass == 0.0 || HasInertia(body) || !IsNegligible(body)) return;
+    if (joint_of_[b] < 0 || HasInertia(body) || !IsNegligible(body)) return;
+    if (body.mass == 0.0 && !bare_) return;
     Joint& joint = tree_.joints[joint_of_[b]];
     if (joint.kind == JointKind::kFixed || Contains(motors_, joint.name)) return;
     if (keep_.count(body.name) > 0 || !IsLoose(b)) return;
@@ -232,6 +241,7 @@ class Folder {
 
   const std::set<std::string>& keep_;
   const std::vector<std::string>& motors_;
+  const bool bare_;
   UrdfTree& tree_;
   double total_kg_ = 0.0;
   std::vector<int> carrier_;   // per link: itself, the link that carries it, or -1: the world
@@ -252,8 +262,8 @@ class Folder {
 // Links named in `keep` stay bodies. What was done is one warning; what really matters and lacks
 // inertia is left for the checks to name. `UrdfTree::frames` lists where each link went.
 void FoldFrameLinks(const std::set<std::string>& keep, const std::vector<std::string>& motors,
-                    const std::string& file, UrdfTree* tree, Diagnostics* diagnostics) {
-  Folder folder(keep, motors, tree);
+                    bool bare, const std::string& file, UrdfTree* tree, Diagnostics* diagnostics) {
+  Folder folder(keep, motors, bare, tree);
   folder.Run();
   folder.Report(file, diagnostics);
 }
@@ -314,7 +324,7 @@ std::optional<UrdfReader::Source> UrdfReader::ReadSource(const Block& model, con
   if (const YamlNode* attach = model.Section("attach")) {
     for (const YamlEntry& entry : attach->entries) keep.insert(entry.key);
   }
-  FoldFrameLinks(keep, source.motors, source.file, &source.tree, &others_);
+  FoldFrameLinks(keep, source.motors, bare_, source.file, &source.tree, &others_);
   return source;
 }
 

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "base/names.h"
+#include "mechanism/reach.h"
 #include "model_file/element_text.h"
 #include "model_file/mesh/read_mesh.h"
 #include "model_file/model_drives.h"
@@ -107,6 +108,9 @@ class ModelWriter {
     if (!frames_[0].lines.empty() || !m_.bodies[0].shapes.empty()) {
       text += "world:\n" + FramesAndShapes(0, "  ");
     }
+    const bool impossible = std::ranges::any_of(
+        m_.bodies, [](const Body& body) { return !ImpossibleInertia(body).empty(); });
+    if (impossible) text += "allow: impossible_inertia\n";
     text += "bodies:\n";
     for (size_t b = 1; b < m_.bodies.size(); ++b) text += BodyText(b);
     return text + joints + rest;

@@ -175,13 +175,13 @@ TEST_F(MeshShapes, GoThroughUrdfAndBack) {
 
 TEST_F(MeshShapes, BodiesAloneAreReadWhateverTheirMassesAndLoops) {
   std::string urdf = kUrdf;
-  urdf.replace(urdf.find("izz=\"1\""), 7, "izz=\"9\"");
+  urdf.replace(urdf.find("izz=\"1\""), 7, "izz=\"-9\"");
   const std::string file = folder_.Write("robot/arm.urdf", urdf);
   EXPECT_FALSE(LoadModel(file).mechanism);
   const LoadedBodies loaded = LoadBodies(file);
   EXPECT_FALSE(loaded.diagnostics.has_errors()) << loaded.diagnostics.Text();
   ASSERT_EQ(loaded.bodies.size(), 2U);
-  EXPECT_EQ(loaded.bodies[1].I_Bcm_B(2, 2), 9.0);
+  EXPECT_EQ(loaded.bodies[1].I_Bcm_B(2, 2), -9.0);
   EXPECT_TRUE(LoadBodies(folder_.PathOf("none.yaml")).diagnostics.has_errors());
 }
 

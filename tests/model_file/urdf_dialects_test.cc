@@ -2,8 +2,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
+#include "model_file/write_model.h"
 #include "tests/support/test_folder.h"
 
 namespace mbv {
@@ -120,7 +123,7 @@ TEST(UrdfDialects, AChainOfFramesEndsOnItsCarrier) {
   EXPECT_EQ(m.bodies.size(), 3u);
 }
 
-TEST(UrdfDialects, ALightLinkWithoutInertiaIsAMassPointAndAHeavyOneAnError) {
+TEST(UrdfDialects, ALightLinkWithoutInertiaGoesToItsCarrierAndAHeavyOneIsAMassPoint) {
   const test::TestFolder folder("dialects_point");
   const auto robot = [&](double mass) {
     return LoadModel(folder.Write("r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) +
@@ -140,8 +143,10 @@ TEST(UrdfDialects, ALightLinkWithoutInertiaIsAMassPointAndAHeavyOneAnError) {
       << light.diagnostics.Text();
 
   const LoadResult heavy = robot(0.1);
-  EXPECT_FALSE(heavy.mechanism);
-  EXPECT_NE(heavy.diagnostics.Text().find("link 'tool': mass = 0.1 without inertia"),
+  ASSERT_TRUE(heavy.mechanism) << heavy.diagnostics.Text();
+  EXPECT_EQ(heavy.mechanism->bodies[heavy.mechanism->FindBody("tool")].mass, 0.1);
+  EXPECT_NE(heavy.diagnostics.Text().find(
+                "impossible inertia of tool: mass = 0.1 without inertia, taken as it is"),
             std::string::npos)
       << heavy.diagnostics.Text();
 }
@@ -216,6 +221,63 @@ TEST(UrdfBase, AnyLinkCanBeHeld) {
     EXPECT_LT(m.X_WB_home[m.FindBody("torso")].translation().norm(), 1e-15) << base;
     EXPECT_LT((m.X_WB_home[m.FindBody("leg")].translation() - Vec3(0.1, 0, -0.4)).norm(), 1e-15);
   }
+}
+
+// What exporters leave behind and nothing depends on is no error, and what does is said.
+TEST(UrdfDialects, FlawsThatForcesDoNotDependOnAreTaken) {
+  const test::TestFolder folder("urdf_flaws");
+  const auto joint = [](const char* name, const char* type, const char* child, const char* more) {
+    return fmt::format(
+        "<joint name='{}' type='{}'><parent link='base'/><child link='{}'/><axis "
+        "xyz='0 1 0'/>{}</joint>",
+        name, type, child, more);
+  };
+  const auto link = [](const char* name, const char* inertia) {
+    return fmt::format(
+        "<link name='{}'><inertial><origin xyz='0.1 0 0'/><mass value='1'/><inertia "
+        "{} ixy='0' ixz='0' iyz='0'/></inertial><visual><geometry><box size='0 0 "
+        "0'/></geometry></visual></link>",
+        name, inertia);
+  };
+  // No name; shapes without size; impossible inertias and a mass point; a mimic that is fixed, one
+  // of a fixed joint; a link without mass at the end.
+  const LoadResult loaded = LoadModel(folder.Write(
+      "robot.urdf",
+      "<robot><link name='base'/>" + link("arm", "ixx='1' iyy='1' izz='3'") +
+          link("point", "ixx='0' iyy='0' izz='0'") + link("rod", "ixx='0' iyy='2' izz='2'") +
+          link("held", "ixx='1' iyy='1' izz='1'") + "<link name='finger'/>" +
+          joint("a", "continuous", "arm", "") + joint("b", "continuous", "point", "") +
+          joint("c", "fixed", "rod", "<mimic joint='a'/>") +
+          joint("d", "continuous", "held", "<mimic joint='c' offset='0.25'/>") +
+          joint("e", "continuous", "finger", "") + "</robot>"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  EXPECT_EQ(AnalyseMobility(m).dofs, 2);
+  EXPECT_EQ(m.FindBody("finger"), -1);
+  for (const Body& body : m.bodies) EXPECT_TRUE(body.shapes.empty()) << body.name;
+  EXPECT_NEAR(m.X_WB_home[m.FindBody("held")].linear()(0, 2), std::sin(0.25), 1e-12);
+  const std::string said = loaded.diagnostics.Text();
+  for (const char* what :
+       {"impossible inertia of arm: principal inertias 1, 1, 3 kg m² violate I1 + I2 >= I3, taken",
+        "impossible inertia of point: mass = 1 without inertia, taken",
+        "impossible inertia of rod: principal inertias 0, 2, 2 kg m² violate I > 0, taken",
+        "joint 'c' is fixed and does not follow 'a'",
+        "joint 'd' follows 'c', which is fixed: it is held at 0.25",
+        "the joints e move nothing of mass and are held at zero"}) {
+    EXPECT_NE(said.find(what), std::string::npos) << what << "\n" << said;
+  }
+  // Its model file allows what the robot's file has.
+  const std::string text = WriteModel(m);
+  EXPECT_NE(text.find("allow: impossible_inertia"), std::string::npos);
+  const LoadResult back = LoadModelText(text, "model.yaml");
+  EXPECT_TRUE(back.mechanism) << back.diagnostics.Text();
+  EXPECT_EQ(TextsOf(back.caveats, ModelCaveat::Kind::kAllowed).size(), 3u);
+  // An inertia that is negative is beyond that.
+  const LoadResult negative = LoadModel(
+      folder.Write("negative.urdf", "<robot name='n'><link name='base'/>" +
+                                        link("arm", "ixx='-1' iyy='1' izz='1'") +
+                                        joint("a", "continuous", "arm", "") + "</robot>"));
+  EXPECT_FALSE(negative.mechanism);
 }
 
 }  // namespace

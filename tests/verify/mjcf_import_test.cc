@@ -236,8 +236,8 @@ TEST(MjcfImport, LoopsThatOnlyPrintedDigitsKeepFromMovingMove) {
     const SurveyRow row = SurveyFile(file, folder.PathOf("scratch"));
     EXPECT_EQ(row.status, "ok") << digits << row.message;
     EXPECT_EQ(row.caveats.size(), 1u);
-    // A rod that is longer by much more than a digit is another mechanism.
-    const double wrong = 3000.0 * std::pow(10.0, -digits);
+    // A rod that is longer by more than drawings differ is another mechanism.
+    const double wrong = 2e-2;
     LoadOptions none;
     none.closure_tolerance_m = 0.0;
     const LoadResult strict = LoadRobot(file, none);
@@ -246,6 +246,12 @@ TEST(MjcfImport, LoopsThatOnlyPrintedDigitsKeepFromMovingMove) {
     EXPECT_TRUE(!spoilt.mechanism || AnalyseMobility(*spoilt.mechanism).dofs == 0) << digits;
   }
   EXPECT_TRUE(LeftOut(LoadText(folder, Rods(17))).empty());
+  // Less than that is taken for such, because the motor could not move otherwise.
+  const LoadResult drawn = LoadText(folder, Rods(8, 3e-5));
+  ASSERT_TRUE(drawn.mechanism) << drawn.diagnostics.Text();
+  EXPECT_EQ(AnalyseMobility(*drawn.mechanism).dofs, 1);
+  ASSERT_EQ(LeftOut(drawn).size(), 1u);
+  EXPECT_NE(LeftOut(drawn)[0].find("m could not move otherwise"), std::string::npos);
 }
 
 // A model that was written as MJCF and read again has the same drives, and they hold its home with

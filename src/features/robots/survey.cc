@@ -112,7 +112,7 @@ void Survey(const std::string& file, const std::string& scratch, const LoadOptio
   DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml", options);
   if (!made.setup) {
     row->message = WithHint(FirstError(made.diagnostics));
-    row->status = "failed";
+    row->status = "refused";
     return;
   }
   const std::filesystem::path folder(scratch);

@@ -51,26 +51,52 @@ Drive DriveOn(const Mechanism& m, const Coordinate& coordinate) {
   return drive;
 }
 
-// A ball that turns in this motion becomes a universal joint that does not; false without one.
+// A ball becomes a universal joint that does not turn about a direction at home.
+void HoldAbout(const Vec3& n_W, const Mechanism& m, Joint* joint) {
+  Mat3 E;
+  E.col(2) = n_W.normalized();
+  E.col(0) = E.col(2).unitOrthogonal();
+  E.col(1) = E.col(2).cross(E.col(0));
+  joint->kind = JointKind::kUniversal;
+  joint->axis = Vec3::UnitX();
+  joint->axis2 = Vec3::UnitY();
+  joint->X_PF.linear() = m.X_WB_home[joint->parent].linear().transpose() * E;
+  joint->X_CM.linear() = m.X_WB_home[joint->child].linear().transpose() * E;
+  joint->guess = joint->home = {};
+  joint->range = {};
+}
+
+// A ball that turns in this motion is held about it; false without one.
 bool HoldTurn(const std::vector<Vec6>& motion, Mechanism* m) {
   for (Joint& joint : m->joints) {
     if (joint.kind != JointKind::kSpherical) continue;
     const Vec3 turn = motion[joint.child].head<3>() - motion[joint.parent].head<3>();
     if (turn.norm() < 1e-3) continue;
-    Mat3 E;
-    E.col(2) = turn.normalized();
-    E.col(0) = E.col(2).unitOrthogonal();
-    E.col(1) = E.col(2).cross(E.col(0));
-    joint.kind = JointKind::kUniversal;
-    joint.axis = Vec3::UnitX();
-    joint.axis2 = Vec3::UnitY();
-    joint.X_PF.linear() = m->X_WB_home[joint.parent].linear().transpose() * E;
-    joint.X_CM.linear() = m->X_WB_home[joint.child].linear().transpose() * E;
-    joint.guess = joint.home = {};
-    joint.range = {};
+    HoldAbout(turn, *m, &joint);
     return true;
   }
   return false;
+}
+
+// Rods between two balls that are not quite symmetric about their lines, where nothing but their
+// spins is left free: in a robot friction holds them, and here one of their balls does.
+std::vector<ModelCaveat> HoldUnevenSpins(size_t free, Mechanism* m) {
+  std::vector<Spin> spins = FindSpins(*m);
+  std::erase_if(spins, [](const Spin& spin) { return spin.why_not.empty(); });
+  if (spins.size() != free) return {};
+  std::vector<std::string> names;
+  for (const Spin& spin : spins) {
+    const Vec3 n_W = m->X_WB_home[static_cast<size_t>(spin.bodies[0])].linear() * spin.n_B;
+    HoldAbout(n_W, *m, &m->joints[static_cast<size_t>(spin.balls[0])]);
+    names.push_back(spin.name);
+  }
+  return {
+      {.kind = ModelCaveat::Kind::kLeftOut,
+       .text = fmt::format("the free spin of {} about the line{} between {} balls is left out: one "
+                           "ball of each, a universal joint here, bears the moment about the line",
+                           Joined(names, kMostNames), names.size() == 1 ? "" : "s",
+                           names.size() == 1 ? "its" : "their"),
+       .source = "ball"}};
 }
 
 // The mechanism with balls held where no drive holds them: for a look at where the drives lead.
@@ -357,9 +383,26 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   DefaultSetup setup;
   std::vector<Coordinate> by_forces;
   Mechanism m = WithDriveForEachDof(*loaded.mechanism, &setup.notes, &by_forces);
+  std::vector<ModelCaveat> caveats = by_forces.empty()
+                                         ? std::vector<ModelCaveat>()
+                                         : HoldUnevenSpins(by_forces.size(), &*loaded.mechanism);
+  if (!caveats.empty()) {
+    setup.notes.clear();
+    m = WithDriveForEachDof(*loaded.mechanism, &setup.notes, &by_forces);
+    setup.notes.push_back(caveats[0].text);
+  }
+  caveats.insert(caveats.end(), loaded.caveats.begin(), loaded.caveats.end());
   setup.by_forces = static_cast<int>(by_forces.size());
   if (setup.by_forces > 0) AddOutputs(&m);
   if (!name.empty()) m.name = name;
+  const bool has_mass =
+      std::ranges::any_of(m.bodies, [](const Body& body) { return body.mass > 0.0; });
+  if (!has_mass) {
+    result.diagnostics.Add({Severity::kError, file, 0, 0,
+                            "no body has mass: there are no forces to compare",
+                            "give the links an <inertial>"});
+    return result;
+  }
   if (m.drives.empty() && by_forces.empty()) {
     result.diagnostics.Add({Severity::kError, file, 0, 0,
                             "the mechanism has no degree of freedom: there is nothing to move",
@@ -387,7 +430,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
     setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");
   }
   setup.meshes = TakeMeshesAlong(&m);
-  setup.model = WriteModel(m, loaded.caveats);
+  setup.model = WriteModel(m, caveats);
   setup.scenario = ScenarioText(m, motion, model_ref, setup.notes, by_forces, !resting.empty());
   setup.mechanism = std::move(m);
   for (const std::string& note : setup.notes) {

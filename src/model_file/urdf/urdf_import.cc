@@ -14,6 +14,7 @@
 #include "base/names.h"
 #include "base/text.h"
 #include "math/spatial.h"
+#include "mechanism/joint_pose.h"
 #include "model_file/model_bodies.h"
 #include "model_file/urdf/urdf_closures.h"
 #include "model_file/write_model.h"
@@ -138,6 +139,7 @@ class Importer {
     tree_.transmission_joints = details_.transmission_joints;
     tree_.gravity_W = details_.gravity_W;
     tree_.left_out = details_.left_out;
+    FixMimics();
     CheckMimics();
     TakeExtras();
     const Finding place{.severity = Severity::kWarning, .file = file_, .message = {}, .hint = {}};
@@ -210,17 +212,21 @@ class Importer {
     return body;
   }
 
+  // Shapes of no size show nothing.
   void AddShape(const urdf::Visual& visual, Body* body) {
     if (!visual.geometry) return;
     const Pose X = ToPose(visual.origin);
     if (!X.matrix().allFinite()) return;
     Shape shape;
     if (const auto* box = dynamic_cast<const urdf::Box*>(visual.geometry.get())) {
+      if (!(ToVec(box->dim).minCoeff() > 0.0)) return;
       shape.geometry = Box{X, ToVec(box->dim)};
     } else if (const auto* c = dynamic_cast<const urdf::Cylinder*>(visual.geometry.get())) {
       const Vec3 half(0, 0, 0.5 * c->length);
+      if (!(std::min(c->length, c->radius) > 0.0)) return;
       shape.geometry = Cylinder{X * Vec3(-half), X * half, c->radius};
     } else if (const auto* s = dynamic_cast<const urdf::Sphere*>(visual.geometry.get())) {
+      if (!(s->radius > 0.0)) return;
       shape.geometry = Ball{X.translation(), s->radius};
     } else if (const auto* m = dynamic_cast<const urdf::Mesh*>(visual.geometry.get())) {
       shape.geometry = Mesh{.X_BG = X, .file = m->filename, .scale = ToVec(m->scale)};
@@ -280,6 +286,33 @@ class Importer {
       tree_.extras.push_back(
           {name, extra.rotor_inertia, extra.gear_ratio, extra.stiffness, extra.free});
     }
+  }
+
+  // What follows a fixed joint does not move, and what is fixed follows nothing.
+  void FixMimics() {
+    const auto named = [this](const std::string& name) {
+      return std::ranges::find(tree_.joints, name, &Joint::name);
+    };
+    std::erase_if(tree_.mimics, [&](const UrdfTree::Mimic& mimic) {
+      const auto joint = named(mimic.joint), of = named(mimic.of);
+      if (joint == tree_.joints.end() || of == tree_.joints.end()) return false;
+      const bool is_fixed = joint->kind == JointKind::kFixed;
+      if (!is_fixed && (of->kind != JointKind::kFixed || DofsOf(joint->kind) != 1)) return false;
+      const int line = LineOf(details_.joint_lines, mimic.joint);
+      if (is_fixed) {
+        Warn(line,
+             fmt::format("joint '{}' is fixed and does not follow '{}'", mimic.joint, mimic.of));
+        return true;
+      }
+      Warn(line, fmt::format("joint '{}' follows '{}', which is fixed: it is held at {:g}",
+                             mimic.joint, mimic.of, mimic.offset));
+      joint->X_PF = joint->X_PF * JointPose(*joint, {mimic.offset});
+      joint->kind = JointKind::kFixed;
+      joint->range = {};
+      std::erase_if(tree_.dynamics,
+                    [&](const UrdfTree::Dynamics& on) { return on.joint == mimic.joint; });
+      return true;
+    });
   }
 
   void CheckMimics() {
@@ -460,11 +493,16 @@ UrdfTree ReadUrdf(const std::string& text, const std::string& file, Diagnostics*
   if (top == nullptr || std::string_view(top->Name()) != "robot") {
     return fail("no URDF: the root element is not <robot>");
   }
+  // urdfdom takes no robot without a name, which nothing depends on.
+  std::string named = text;
+  if (top->Attribute("name") == nullptr) {
+    named.insert(named.find("<robot") + std::string_view("<robot").size(), " name=\"robot\"");
+  }
   Diagnostics said;
   urdf::ModelInterfaceSharedPtr model;
   try {
     const LogCapture capture(file, &said);
-    model = urdf::parseURDF(text);
+    model = urdf::parseURDF(named);
   } catch (const std::exception& e) {
     said.Add({Severity::kError, file, 0, 0, std::string("urdfdom: ") + e.what(), ""});
   }

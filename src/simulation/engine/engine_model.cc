@@ -5,6 +5,7 @@
 
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
+#include "simulation/mjcf/mjcf.h"
 
 namespace mbv::simulation {
 namespace {
@@ -139,19 +140,21 @@ RunSummary FindElements(EngineModel* engine) {
   return RunSummary::Done();
 }
 
-// MuJoCo compiles no body whose inertia violates the triangle inequality.
-RunSummary CheckInertias(const Mechanism& mechanism) {
-  for (const Body& body : mechanism.bodies) {
-    const std::string violation = TriangleViolation(body);
-    if (violation.empty()) continue;
-    return {.stop = Stop::kUnsupported,
-            .message = "MuJoCo cannot follow: it refuses body '" + body.name + "', whose " +
-                       violation + "; the other witnesses take it as it is",
-            .where = body.name,
-            .unit = {},
-            .names_where = true};
+// MuJoCo compiles no body whose inertia violates the triangle inequality, and then steps it as any
+// other.
+void SetImpossibleInertias(EngineModel* engine) {
+  bool any = false;
+  for (size_t i = 1; i < engine->plan.bodies.size(); ++i) {
+    const mjcf::PlannedBody& body = engine->plan.bodies[i];
+    if (body.mass <= 0.0) continue;
+    const PrincipalInertia principal = PrincipalInertiaOf(body.I_Bcm_B, body.mass);
+    if (principal.moments == principal.admissible) continue;
+    Eigen::Map<Vec3>{engine->m->body_inertia + 3 * engine->body_id[i]} = principal.moments;
+    any = true;
   }
-  return RunSummary::Done();
+  if (!any) return;
+  const DataHandle scratch = MakeData(*engine->m);
+  mj_setConst(engine->m.get(), scratch.get());
 }
 
 }  // namespace
@@ -168,7 +171,6 @@ void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data) {
 
 RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                            EngineModel* engine) {
-  if (RunSummary summary = CheckInertias(mechanism); !summary.ok()) return summary;
   if (RunSummary summary = CheckCouplings(mechanism); !summary.ok()) return summary;
   engine->mechanism = &mechanism;
   engine->plan = mjcf::MakePlan(mechanism);
@@ -186,6 +188,7 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
       engine->joint_ids[joint.joint].push_back(IdOf(m, mjOBJ_JOINT, joint.name));
     }
   }
+  SetImpossibleInertias(engine);
   for (const mjcf::PlannedClosure& closure : engine->plan.closures) {
     engine->closure_equality.push_back(IdOf(m, mjOBJ_EQUALITY, closure.name));
   }
@@ -228,6 +231,7 @@ void SetRestRates(double duration_s, EngineModel* engine) {
 void AddFrictionRows(EngineModel* engine) {
   mjModel& m = *engine->m;
   std::vector<FrictionPlace> places;
+  places.reserve(static_cast<size_t>(m.nv + m.ntendon));
   for (int dof = 0; dof < m.nv; ++dof) places.push_back({.dof = dof, .elements = {}});
   for (int t = 0; t < m.ntendon; ++t) places.push_back({.tendon = t, .elements = {}});
   for (size_t e = 0; e < engine->elements.size(); ++e) {

@@ -69,13 +69,19 @@ class MjcfWriter {
     const PrincipalInertia principal = PrincipalInertiaOf(body.I_Bcm_B, body.mass);
     if (plan_.tiny_mass[body.body]) {
       xml_.Comment(" massless in the mechanism; MuJoCo needs some mass ");
+    } else if (principal.moments != principal.admissible) {
+      xml_.Comment(
+          fmt::format(" impossible in the mechanism: diaginertia = {} {} {}, which MuJoCo refuses; "
+                      "mbverify sets "
+                      "them after compilation ",
+                      principal.moments[0], principal.moments[1], principal.moments[2]));
     }
     xml_.Open("inertial");
     xml_.Set("pos", mechanism_.bodies[body.body].p_BoBcm_B);
     xml_.Set("mass", body.mass);
     const Eigen::Vector4d quat = mjcf::QuatOf(principal.R);
     if (quat[0] != 1.0) xml_.Set("quat", std::span<const double>(quat.data(), 4));
-    xml_.Set("diaginertia", std::span<const double>(principal.moments.data(), 3));
+    xml_.Set("diaginertia", std::span<const double>(principal.admissible.data(), 3));
     xml_.Close();
   }
 
@@ -506,6 +512,8 @@ PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass) {
   const double largest = m.maxCoeff(&k);
   const double others = m[(k + 1) % 3] + m[(k + 2) % 3];
   if (largest > others && largest < others * (1.0 + 1e-9)) m[k] = others;
+  principal.admissible = m;
+  if (largest > others) principal.admissible[k] = others;
   return principal;
 }
 

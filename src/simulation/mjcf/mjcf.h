@@ -47,10 +47,11 @@ struct MjcfOptions {
 [[nodiscard]] std::string WithKeys(const std::string& mjcf, const std::vector<MjcfKey>& keys);
 
 /// Principal moments (descending) and axes of an inertia matrix: I = R diag(moments) Rᵀ. Diagonal
-/// matrices keep their axes. Moments are made admissible where rounding or a slender body breaks
-/// MuJoCo's rules (positive; none larger than the sum of the others).
+/// matrices keep their axes. Moments are raised where rounding or a slender body breaks MuJoCo's
+/// rules (positive; none larger than the sum of the others).
 struct PrincipalInertia {
   Vec3 moments = Vec3::Zero();
+  Vec3 admissible = Vec3::Zero();  ///< that MuJoCo compiles; others of impossible bodies only
   Mat3 R = Mat3::Identity();
 };
 [[nodiscard]] PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass);

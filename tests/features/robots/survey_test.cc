@@ -177,6 +177,26 @@ TEST(DefaultSetup, EveryFreedomGetsOneDrive) {
   EXPECT_NE(notes.back().find("chosen by rank"), std::string::npos) << notes.back();
 }
 
+// Alone such spins are held by a ball of the rod, and every verdict says so.
+TEST(DefaultSetup, WhereOnlySpinsOfRodsAreLeftOneBallHoldsEach) {
+  const test::TestFolder folder("uneven_rod");
+  const std::string file = folder.Write("rod.yaml", kRod);
+  const DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
+  ASSERT_TRUE(made.setup) << made.diagnostics.Text();
+  EXPECT_EQ(made.setup->by_forces, 0);
+  const Mechanism& m = made.setup->mechanism;
+  EXPECT_EQ(AnalyseMobility(m).undriven, 0);
+  EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("B"))].kind, JointKind::kUniversal);
+  EXPECT_NE(made.setup->model.find("the free spin of rod about the line between its balls is left "
+                                   "out"),
+            std::string::npos)
+      << made.setup->model;
+  const SurveyRow row = SurveyFile(file, folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  ASSERT_EQ(row.caveats.size(), 1u);
+  EXPECT_NE(row.caveats[0].find("the free spin of rod"), std::string::npos);
+}
+
 // One that is symmetric about its line spins idly.
 TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   std::string round = kRod;

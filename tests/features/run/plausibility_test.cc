@@ -9,6 +9,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "comparison/force_scale.h"
 #include "features/run/run_scenario.h"
 #include "reference/reference.h"
 #include "report/report.h"
@@ -279,7 +280,50 @@ TEST(Waiver, RoundedDataAndImpossibleInertiasStandInTheVerdict) {
                    "inertia: [rho*crank*bar^2/2, rho*crank*crank^2/12, rho*crank*crank^2/3]"}});
   // Alone it is a sentence of its own, with a capital on the page.
   ExpectReportedEverywhere(allowed, "llowed by the model: impossible inertia of crank");
-  EXPECT_NE(allowed.exit_code, 0) << "MuJoCo does not take it";
+  EXPECT_EQ(allowed.exit_code, 0) << allowed.report->comparison.reason;
+}
+
+// Nothing weighs on a drive that moves a massless body. A simulation gives the body some mass, and
+// what that takes is no error; a force that a mass of a millionth asks for is one.
+TEST(MasslessEnd, IsJudgedByWhatASimulationResolves) {
+  const Folder folder("massless_end");
+  const auto write = [&](const std::string& file, const std::string& feather) {
+    return folder.Write(file,
+                        "name: feather\nbodies:\n  arm: {frames: {tip: [0.4, 0, 0]}, mass: 2, "
+                        "com: [0.2, 0, 0], inertia: [0.1, 0.1, 0.1]}\n  feather: " +
+                            feather +
+                            "\njoints:\n"
+                            "  a: {kind: revolute, parent: world, child: arm, axis: y}\n"
+                            "  b: {kind: revolute, parent: arm.tip, child: feather, axis: y}\n"
+                            "drives: {a: {kind: joint, joint: a}, b: {kind: joint, joint: b}}\n");
+  };
+  const std::string model = write("model.yaml", "{}");
+  const std::string scenario = folder.Write(
+      "first.yaml",
+      "mechanism: ./model.yaml\nmotion:\n  duration_s: 1\n  sample_s: 0.02\n  commands:\n"
+      "    a: [home, {bump: {start_s: 0, duration_s: 1, height: 0.3}}]\n"
+      "    b: [home, {bump: {start_s: 0, duration_s: 1, height: 0.2}}]\n"
+      "analytic: none\nsimulation: {mode: inverse}\n");
+  const RunOutcome outcome = RunScenarioFile(scenario, {}, folder.path.string());
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
+  const PairComparison* pair = outcome.report->comparison.FindPair("simulated_vs_reference");
+  ASSERT_NE(pair, nullptr);
+  const double error = pair->drives[1].nrmse;
+  EXPECT_EQ(pair->drives[1].rms_truth, 0.0);
+  EXPECT_GT(error, 0.0);
+  EXPECT_LT(error, 1e-9);
+  // Against the forces of a feather that has mass, by its share of all.
+  const RunOutcome heavy =
+      RunScenarioFile(scenario,
+                      {{"mechanism", write("heavy.yaml",
+                                           "{mass: 2e-6, com: [0.1, 0, 0], inertia: [1e-8, "
+                                           "1e-8, 1e-8]}")}},
+                      folder.path.string());
+  ASSERT_TRUE(heavy.report) << heavy.diagnostics.Text();
+  EXPECT_GT(heavy.report->comparison.FindPair("simulated_vs_reference")->drives[1].rms_truth /
+                (pair->drives[0].rms_truth * ForceScale::kIdle),
+            1e-5);
 }
 
 }  // namespace
