@@ -161,6 +161,10 @@ class Folder {
     if (body.mass == 0.0 && !bare_) return;
     Joint& joint = tree_.joints[joint_of_[b]];
     if (joint.kind == JointKind::kFixed || Contains(motors_, joint.name)) return;
+    const bool is_coupled = std::ranges::any_of(tree_.mimics, [&](const UrdfTree::Mimic& mimic) {
+      return mimic.joint == joint.name || mimic.of == joint.name;
+    });
+    if (is_coupled) return;
     if (keep_.count(body.name) > 0 || !IsLoose(b)) return;
     joint.kind = JointKind::kFixed;
     joint.range = {};

@@ -251,6 +251,16 @@ TEST(UrdfDialects, FlawsThatForcesDoNotDependOnAreTaken) {
           joint("d", "continuous", "held", "<mimic joint='c' offset='0.25'/>") +
           joint("e", "continuous", "finger", "") + "</robot>"));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  // One that another joint leads, or follows, stays.
+  const LoadResult coupled = LoadModel(folder.Write(
+      "coupled.urdf", "<robot name='r'><link name='base'/><link name='left'/><link name='right'/>" +
+                          link("arm", "ixx='1' iyy='1' izz='1'") +
+                          joint("a", "continuous", "arm", "") +
+                          joint("l", "continuous", "left", "<mimic joint='a'/>") +
+                          joint("r", "continuous", "right", "<mimic joint='l'/>") + "</robot>"));
+  ASSERT_TRUE(coupled.mechanism) << coupled.diagnostics.Text();
+  EXPECT_EQ(coupled.mechanism->couplings.size(), 2u);
+  EXPECT_EQ(AnalyseMobility(*coupled.mechanism).dofs, 1);
   const Mechanism& m = *loaded.mechanism;
   EXPECT_EQ(AnalyseMobility(m).dofs, 2);
   EXPECT_EQ(m.FindBody("finger"), -1);

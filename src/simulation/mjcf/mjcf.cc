@@ -488,6 +488,7 @@ namespace {
 // body with this radius of gyration, are raised. MuJoCo refuses zero.
 constexpr double kSmallestMomentRatio = 1e-12;
 constexpr double kSmallestGyration_m = 1e-7;
+constexpr double kSmallestMoment = 2e-15;  // MuJoCo refuses less than 1e-15 kg m²
 
 }  // namespace
 
@@ -504,8 +505,9 @@ PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass) {
     if (principal.R.determinant() < 0.0) principal.R.col(2) *= -1.0;
   }
   Vec3& m = principal.moments;
-  const double floor = std::max(kSmallestMomentRatio * m.maxCoeff(),
-                                mass * kSmallestGyration_m * kSmallestGyration_m);
+  const double floor =
+      std::max({kSmallestMomentRatio * m.maxCoeff(),
+                mass * kSmallestGyration_m * kSmallestGyration_m, kSmallestMoment});
   m = m.cwiseMax(floor);
   // A lamina's largest moment is the sum of the others, up to rounding.
   int k = 0;
