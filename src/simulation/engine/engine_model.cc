@@ -231,7 +231,7 @@ void SetRestRates(double duration_s, EngineModel* engine) {
 void AddFrictionRows(EngineModel* engine) {
   mjModel& m = *engine->m;
   std::vector<FrictionPlace> places;
-  places.reserve(static_cast<size_t>(m.nv + m.ntendon));
+  places.reserve(static_cast<size_t>(m.nv) + static_cast<size_t>(m.ntendon));
   for (int dof = 0; dof < m.nv; ++dof) places.push_back({.dof = dof, .elements = {}});
   for (int t = 0; t < m.ntendon; ++t) places.push_back({.tendon = t, .elements = {}});
   for (size_t e = 0; e < engine->elements.size(); ++e) {
