@@ -13,6 +13,7 @@
 #include "comparison/force_scale.h"
 #include "comparison/pair_reader.h"
 #include "mechanism/channels.h"
+#include "mechanism/reach.h"
 
 namespace mbv::internal {
 namespace {
@@ -278,11 +279,13 @@ class Loops {
   size_t count_ = 0;
 };
 
-// Per joint. Where it closes no loop, equilibrium of the smaller of its bodies gives its reaction.
-// In a loop equilibrium of one body does not: a rod transmits what the bodies at its ends leave,
-// and were it massless that would be all. There the loop's largest body counts.
+// Per joint, of which all together bear `rms_N`. Where it closes no loop, equilibrium of the
+// smaller of its bodies gives its reaction. In a loop equilibrium of one body does not: a rod
+// transmits what the bodies at its ends leave, and were it massless that would be all. There the
+// loop's largest body counts. A massless end bears nothing, and in a simulation what its stand-in
+// for the mass weighs: there all joints count.
 std::vector<Local> LocalScales(const ComparisonInput& input, const ForceScale& scale,
-                               const std::vector<JointError>& errors) {
+                               const std::vector<JointError>& errors, double rms_N) {
   const Mechanism& mechanism = *input.mechanism;
   std::vector<Local> bodies(mechanism.bodies.size());
   const auto raise = [](Local* local, const Local& by) {
@@ -299,6 +302,9 @@ std::vector<Local> LocalScales(const ComparisonInput& input, const ForceScale& s
   const Loops loops(mechanism);
   std::vector<Local> of_loops(loops.count()), joints;
   loops.ForEach([&](size_t loop, size_t body) { raise(&of_loops[loop], bodies[body]); });
+  for (size_t b = 1; b < bodies.size(); ++b) {
+    if (IsMassless(mechanism.bodies[b]) && bodies[b].force_N == 0.0) bodies[b].force_N = rms_N;
+  }
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
     if (const auto loop = loops.Of(j)) {
       joints.push_back(of_loops[*loop]);
@@ -341,21 +347,19 @@ void CompareOwn(const ComparisonInput& input, const ForceScale& scale,
                 const std::vector<JointError>& errors, PairComparison* pair) {
   ErrorSum all;
   for (const JointError& error : errors) all.Merge(error.force);
-  const double roundoff = kRoundoff * OrZero(all.rms_truth());
-  const std::vector<Local> scales = LocalScales(input, scale, errors);
+  const double rms_N = OrZero(all.rms_truth()), roundoff = kRoundoff * rms_N;
+  const std::vector<Local> scales = LocalScales(input, scale, errors, rms_N);
   for (const JointError& error : errors) {
     const auto joint = static_cast<size_t>(error.joint - input.mechanism->joints.data());
     const double turned = scales[joint].moment_Nm;
     const double local = std::max(scales[joint].force_N, kMomentArm * turned / scale.length_m);
-    // A massless end bears what a simulation's stand-in for its mass weighs.
-    const double of_mass = local > 0.0 ? local : OrZero(all.rms_truth());
-    const double least = std::max(ForceScale::kIdle * of_mass, roundoff);
+    const double least = std::max(ForceScale::kIdle * local, roundoff);
     if (error.force.count() > 0) {
       KeepWorst(&pair->metrics, Metric::kReactionOwn, error.force.MeasuredNrmse(least));
     }
     if (error.moment.count() == 0) continue;
     const double floor =
-        std::max(OrZero(error.force.rms_truth()), of_mass) * kMomentArm * scale.length_m;
+        std::max(OrZero(error.force.rms_truth()), local) * kMomentArm * scale.length_m;
     KeepWorst(&pair->metrics, Metric::kReactionOwn,
               error.moment.MeasuredNrmse(
                   std::max({floor, roundoff * scale.length_m, ForceScale::kIdle * turned})));

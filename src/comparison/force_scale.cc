@@ -299,11 +299,9 @@ class Scales {
     for (size_t k = 0; k < mechanism_.drives.size(); ++k) {
       bool moves_mass = scale_.driven[k] > 0.0, moves = false;
       for (size_t b = 1; b < bodies_.size(); ++b) {
-        const Body& body = mechanism_.bodies[b];
-        const bool massless = body.mass == 0.0 && body.I_Bcm_B.isZero(0.0);
         const bool moved = Size(k, b) > kRoundoff;
         moves = moves || moved;
-        moves_mass = moves_mass || (moved && !massless);
+        moves_mass = moves_mass || (moved && !IsMassless(mechanism_.bodies[b]));
       }
       if (!moves || moves_mass) continue;
       const bool is_force = ForceUnit(mechanism_, mechanism_.drives[k]) == "N";

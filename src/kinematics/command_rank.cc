@@ -118,20 +118,28 @@ Command HeldAt(const Coordinate& coordinate) {
   return {.name = "", .terms = {{coordinate, 1.0}}, .profile = {}};
 }
 
-}  // namespace
-
-std::vector<size_t> StuckDrives(const Mechanism& mechanism) {
+// A row per coordinate, a column per DOF.
+MatX GradientsInDofs(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates) {
   const BodyStates home = HomeStates(mechanism);
   const MatX motion = FindRank(HeldRows(mechanism, home).Matrix(), NullSpaces::kMotion).motion;
   RowStack rows(mechanism.bodies.size(), CharacteristicLength(mechanism));
-  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
-    AddCommand(mechanism, home, HeldAt({Coordinate::Kind::kDrive, static_cast<int>(d), 0}), &rows);
+  for (const Coordinate& coordinate : coordinates) {
+    AddCommand(mechanism, home, HeldAt(coordinate), &rows);
   }
-  std::vector<size_t> stuck;
-  if (mechanism.drives.empty()) return stuck;
-  const VecX lengths = (rows.Matrix() * motion).rowwise().norm();
+  return rows.Matrix() * motion;
+}
+
+}  // namespace
+
+std::vector<size_t> StuckDrives(const Mechanism& mechanism) {
+  std::vector<Coordinate> drives;
   for (size_t d = 0; d < mechanism.drives.size(); ++d) {
-    if (!(lengths[static_cast<Eigen::Index>(d)] > kStill)) stuck.push_back(d);
+    drives.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
+  }
+  const MatX gradients = GradientsInDofs(mechanism, drives);
+  std::vector<size_t> stuck;
+  for (size_t d = 0; d < drives.size(); ++d) {
+    if (!(gradients.row(static_cast<Eigen::Index>(d)).norm() > kStill)) stuck.push_back(d);
   }
   return stuck;
 }
@@ -139,15 +147,10 @@ std::vector<size_t> StuckDrives(const Mechanism& mechanism) {
 CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                    const std::vector<Coordinate>& candidates, size_t preferred) {
   constexpr double kIndependent = 1e-5;  // share of a gradient that others do not hold
-  const BodyStates home = HomeStates(mechanism);
-  const MatX motion = FindRank(HeldRows(mechanism, home).Matrix(), NullSpaces::kMotion).motion;
-  CoordinateChoice choice{.dofs = static_cast<int>(motion.cols()), .chosen = {}, .dependent = {}};
-  // Gradients in the DOFs; what is chosen is taken out of those that are left.
-  RowStack rows(mechanism.bodies.size(), CharacteristicLength(mechanism));
-  for (const Coordinate& candidate : candidates) {
-    AddCommand(mechanism, home, HeldAt(candidate), &rows);
-  }
-  MatX gradients = rows.Matrix() * motion;
+  // What is chosen is taken out of those that are left.
+  MatX gradients = GradientsInDofs(mechanism, candidates);
+  CoordinateChoice choice{
+      .dofs = static_cast<int>(gradients.cols()), .chosen = {}, .dependent = {}};
   const VecX lengths = gradients.rowwise().norm();
   const auto take = [&](Eigen::Index k) {
     choice.chosen.push_back(static_cast<size_t>(k));

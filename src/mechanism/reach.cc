@@ -101,10 +101,11 @@ std::string TriangleViolation(const Body& body) {
   return PrincipalInertiaText(principal) + " violate I1 + I2 >= I3";
 }
 
+bool IsMassless(const Body& body) { return body.mass == 0.0 && body.I_Bcm_B.isZero(0.0); }
+
 std::string ImpossibleInertia(const Body& body) {
-  if (body.I_Bcm_B.isZero(0.0)) {
-    return body.mass == 0.0 ? "" : fmt::format("mass = {} without inertia", body.mass);
-  }
+  if (IsMassless(body)) return "";
+  if (body.I_Bcm_B.isZero(0.0)) return fmt::format("mass = {} without inertia", body.mass);
   const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B).eigenvalues();
   if (!(principal[0] > 0.0)) return PrincipalInertiaText(principal) + " violate I > 0";
   return TriangleViolation(body);

@@ -34,6 +34,8 @@ namespace mbv {
 /// "principal inertias 1, 2, 4 kg m² violate I1 + I2 >= I3", or "" if the body's inertia obeys the
 /// triangle inequality (to 1e-9: laminae are on its bound).
 [[nodiscard]] std::string TriangleViolation(const Body& body);
+/// A connecting piece, or an end that nothing weighs on.
+[[nodiscard]] bool IsMassless(const Body& body);
 /// The same, "mass = 2 without inertia" of a mass point, "principal inertias … violate I > 0"; ""
 /// of a massless body without inertia.
 [[nodiscard]] std::string ImpossibleInertia(const Body& body);

@@ -419,7 +419,7 @@ bool Project(const ClosureRules& rules, double gap, const std::string& why, Mech
         "overconstrained by {} and {}",
         projection.moved_m, projection.turned_rad, projection.redundant, why);
     report->AtFile(Severity::kWarning,
-                   rules.is_robot ? report->LeaveOut("rounding of the file's numbers: " + text)
+                   rules.is_robot ? report->LeaveOut(text)
                                   : report->Allow(fmt::format("{} (closure_tolerance {:.2g} m)",
                                                               text, rules.tolerance_m)));
     return true;

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <Eigen/SVD>
+#include <cmath>
 #include <filesystem>
 #include <random>
 
@@ -250,6 +252,37 @@ TEST(Ranks, WithoutAClearGapSingularValuesDecide) {
   EXPECT_EQ(internal::RankOf(with_smallest(0.5e-9)), 11);
   EXPECT_EQ(internal::RankOf(MatX::Zero(3, 5)), 0);
   EXPECT_EQ(internal::RankOf(MatX(0, 5)), 0);
+}
+
+// Eigen's divide and conquer makes NaN of matrices with entries that are all but zero, and the rank
+// of NaN is any number.
+TEST(FindRank, HoldsWhereDivideAndConquerFails) {
+  constexpr int kSize = 24;
+  for (const unsigned seed : {12173U, 7654U, 93017U, 126168U, 235801U}) {
+    std::mt19937_64 random(seed);
+    const auto uniform = [&] { return static_cast<double>(random() >> 11U) * 0x1p-53; };
+    MatX J = MatX::Zero(kSize, kSize);
+    for (int i = 0; i < kSize / 2; ++i) {
+      for (int k = 0; k < kSize; ++k) {
+        if (!(uniform() < 0.12)) continue;
+        const double entry = std::floor(5 * uniform()) - 2;
+        J(i, k) = uniform() < 0.25 ? std::pow(10, -16 - 30 * uniform()) : entry;
+      }
+    }
+    J.bottomRows(kSize / 2) = J.topRows(kSize / 2);
+    Eigen::FullPivLU<MatX> lu(J);
+    lu.setThreshold(1e-9);
+    const internal::RankFinding found = internal::FindRank(J, internal::NullSpaces::kMotion);
+    EXPECT_EQ(found.rank, lu.rank()) << seed;
+    ASSERT_EQ(found.motion.cols(), kSize - found.rank) << seed;
+    EXPECT_LT((J * found.motion).cwiseAbs().maxCoeff(), 1e-12) << seed;
+    EXPECT_LT((found.motion.transpose() * found.motion -
+               MatX::Identity(found.motion.cols(), found.motion.cols()))
+                  .cwiseAbs()
+                  .maxCoeff(),
+              1e-12)
+        << seed;
+  }
 }
 
 }  // namespace

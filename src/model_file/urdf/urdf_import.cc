@@ -293,7 +293,8 @@ class Importer {
     const auto named = [this](const std::string& name) {
       return std::ranges::find(tree_.joints, name, &Joint::name);
     };
-    std::erase_if(tree_.mimics, [&](const UrdfTree::Mimic& mimic) {
+    std::map<std::string, double> held;  // coordinates of joints that were fixed here
+    const auto is_settled = [&](const UrdfTree::Mimic& mimic) {
       const auto joint = named(mimic.joint), of = named(mimic.of);
       if (joint == tree_.joints.end() || of == tree_.joints.end()) return false;
       const bool is_fixed = joint->kind == JointKind::kFixed;
@@ -304,15 +305,19 @@ class Importer {
              fmt::format("joint '{}' is fixed and does not follow '{}'", mimic.joint, mimic.of));
         return true;
       }
+      const double at = mimic.multiplier * held[mimic.of] + mimic.offset;
+      held[mimic.joint] = at;
       Warn(line, fmt::format("joint '{}' follows '{}', which is fixed: it is held at {:g}",
-                             mimic.joint, mimic.of, mimic.offset));
-      joint->X_PF = joint->X_PF * JointPose(*joint, {mimic.offset});
+                             mimic.joint, mimic.of, at));
+      joint->X_PF = joint->X_PF * JointPose(*joint, {at});
       joint->kind = JointKind::kFixed;
       joint->range = {};
       std::erase_if(tree_.dynamics,
                     [&](const UrdfTree::Dynamics& on) { return on.joint == mimic.joint; });
       return true;
-    });
+    };
+    while (std::erase_if(tree_.mimics, is_settled) > 0) {
+    }
   }
 
   void CheckMimics() {

@@ -70,11 +70,10 @@ class MjcfWriter {
     if (plan_.tiny_mass[body.body]) {
       xml_.Comment(" massless in the mechanism; MuJoCo needs some mass ");
     } else if (principal.moments != principal.admissible) {
-      xml_.Comment(
-          fmt::format(" impossible in the mechanism: diaginertia = {} {} {}, which MuJoCo refuses; "
-                      "mbverify sets "
-                      "them after compilation ",
-                      principal.moments[0], principal.moments[1], principal.moments[2]));
+      xml_.Comment(fmt::format(
+          " diaginertia = {} {} {} in the mechanism, which MuJoCo refuses; mbverify sets "
+          "them after compilation ",
+          principal.moments[0], principal.moments[1], principal.moments[2]));
     }
     xml_.Open("inertial");
     xml_.Set("pos", mechanism_.bodies[body.body].p_BoBcm_B);
@@ -505,9 +504,8 @@ PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass) {
     if (principal.R.determinant() < 0.0) principal.R.col(2) *= -1.0;
   }
   Vec3& m = principal.moments;
-  const double floor =
-      std::max({kSmallestMomentRatio * m.maxCoeff(),
-                mass * kSmallestGyration_m * kSmallestGyration_m, kSmallestMoment});
+  const double floor = std::max(kSmallestMomentRatio * m.maxCoeff(),
+                                mass * kSmallestGyration_m * kSmallestGyration_m);
   m = m.cwiseMax(floor);
   // A lamina's largest moment is the sum of the others, up to rounding.
   int k = 0;
@@ -516,6 +514,7 @@ PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass) {
   if (largest > others && largest < others * (1.0 + 1e-9)) m[k] = others;
   principal.admissible = m;
   if (largest > others) principal.admissible[k] = others;
+  principal.admissible = principal.admissible.cwiseMax(kSmallestMoment);
   return principal;
 }
 

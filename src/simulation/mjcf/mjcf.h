@@ -51,7 +51,7 @@ struct MjcfOptions {
 /// rules (positive; none larger than the sum of the others).
 struct PrincipalInertia {
   Vec3 moments = Vec3::Zero();
-  Vec3 admissible = Vec3::Zero();  ///< that MuJoCo compiles; others of impossible bodies only
+  Vec3 admissible = Vec3::Zero();  ///< that MuJoCo compiles; others only where it refuses
   Mat3 R = Mat3::Identity();
 };
 [[nodiscard]] PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass);

@@ -60,8 +60,6 @@ std::vector<Motion1> MotionsOf(const Joint& joint, const Mat3& R_WF, const Mat3&
   return {};
 }
 
-bool IsMassless(const Body& body) { return body.mass == 0.0 && body.I_Bcm_B.isZero(0.0); }
-
 class Planner {
  public:
   explicit Planner(const Mechanism& mechanism)
