@@ -29,6 +29,7 @@ constexpr double kRoundOff = 1e-2;
 // A step that is round-off itself [rad, characteristic lengths]: rows are not evaluated again.
 constexpr double kNoStep = 1e-14;
 constexpr double kFirstStep = 0.1;   ///< [rad, characteristic lengths], by the tangent
+constexpr double kShortStep = 1e-3;  ///< the same: by the last pose's tangent as well
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -232,11 +233,16 @@ void ClosureSolver::Accept(const VecX& target, Trial* trial) {
 }
 
 int ClosureSolver::StepsTo(const VecX& target, VecX* tangent) {
+  VecX rates = VecX::Zero(system_.size());
+  rates.tail(target.size()) = target - target_;
+  // A short way needs no better factors than those of the last one.
+  if (!selection_is_new_) {
+    *tangent = system_.SolveTransposed(rates);
+    if (SizeOf(*tangent, length_) < kShortStep) return 1;
+  }
   if (!rows_are_here_) EvaluateHere();
   if (!system_.Factor(rows_, selection_, selection_is_new_)) return options_.homotopy_steps;
   selection_is_new_ = false;
-  VecX rates = VecX::Zero(system_.size());
-  rates.tail(target.size()) = target - target_;
   *tangent = system_.SolveTransposed(rates);
   const double steps = std::ceil(SizeOf(*tangent, length_) / kFirstStep);
   if (!(steps < options_.homotopy_steps)) return options_.homotopy_steps;

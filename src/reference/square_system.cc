@@ -126,6 +126,7 @@ void SquareSystem::FillColumns(const RowSet& rows, const std::vector<int>& selec
 bool SquareSystem::Factor(const RowSet& rows, const std::vector<int>& selection,
                           bool new_selection) {
   MBV_DEMAND(static_cast<int>(selection.size()) == size_, selection.size());
+  determinant_sign_ = 0;
   if (new_selection) {
     MakeColumns(rows, selection, &matrix_);
     row_scale_.resize(size_);

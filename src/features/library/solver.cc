@@ -266,6 +266,7 @@ std::vector<Coordinate> Chosen(const Mechanism& mechanism, const std::vector<std
 }  // namespace
 
 struct Solver::Impl {
+  /// `coordinates` of these names, independent of each other.
   Impl(Model of, std::vector<std::string> chosen, const std::vector<Coordinate>& coordinates)
       : model(std::move(of)),
         names(std::move(chosen)),
@@ -464,10 +465,11 @@ Status Solver::Derivatives(const VecX& q, MatX* T, MatX* H) {
 
 namespace {
 
-// Runs `row(solver, i)` for all rows, in blocks with a solver of their own.
-BatchStatus ForRows(const std::function<Solver()>& make, Eigen::Index rows, int threads,
+// Runs `row(solver, i)` for all rows, in blocks each of which begins with a solver at home.
+template <typename AtHome>
+BatchStatus ForRows(const AtHome& make, Eigen::Index rows, int threads,
                     const Solver::Progress& progress,
-                    const std::function<Status(Solver*, Eigen::Index)>& row) {
+                    const std::function<Status(decltype(make())*, Eigen::Index)>& row) {
   const Eigen::Index blocks = (rows + Solver::kBlock - 1) / Solver::kBlock;
   std::vector<BatchStatus> found(static_cast<size_t>(blocks));
   std::atomic<Eigen::Index> next{0}, done{0};
@@ -477,7 +479,7 @@ BatchStatus ForRows(const std::function<Solver()>& make, Eigen::Index rows, int 
   const auto work = [&] {
     try {
       for (Eigen::Index block = next++; block < blocks; block = next++) {
-        Solver solver = make();
+        auto solver = make();
         const Eigen::Index end = std::min(rows, (block + 1) * Solver::kBlock);
         for (Eigen::Index i = block * Solver::kBlock; i < end; ++i) {
           Status status{Status::Kind::kNoConvergence, "interrupted"};
@@ -526,12 +528,12 @@ BatchStatus Solver::CloseRows(const MatX& q, MatX* drives, int threads,
                               const Progress& progress) const {
   CheckRows("q", q, q.rows(), size());
   drives->setConstant(q.rows(), static_cast<Eigen::Index>(model().mechanism().drives.size()), kNan);
-  const auto make = [this] { return Solver(model(), coordinates()); };
-  return ForRows(make, q.rows(), threads, progress, [&](Solver* solver, Eigen::Index i) {
-    State state;
-    Status status = solver->Close(q.row(i).transpose(), &state);
-    if (status.ok()) drives->row(i) = state.drives.transpose();
-    return status;
+  const auto make = [this] { return ReducedModel(model().mechanism(), impl_->at); };
+  return ForRows(make, q.rows(), threads, progress, [&](ReducedModel* reduced, Eigen::Index i) {
+    const VecX still = VecX::Zero(size());
+    const RunSummary summary = reduced->Move(q.row(i).transpose(), still, still);
+    if (summary.ok()) drives->row(i) = reduced->sample().driven.position.head(drives->cols());
+    return StatusOf(summary);
   });
 }
 
@@ -543,13 +545,12 @@ BatchStatus Solver::InverseDynamicsRows(const MatX& q, const MatX& v, const MatX
   CheckRows("a", a, q.rows(), size());
   drive_forces->setConstant(q.rows(), static_cast<Eigen::Index>(model().mechanism().drives.size()),
                             kNan);
-  const auto make = [this] { return Solver(model(), coordinates()); };
-  return ForRows(make, q.rows(), threads, progress, [&](Solver* solver, Eigen::Index i) {
-    Impl& impl = *solver->impl_;
+  const auto make = [this] { return ReducedModel(model().mechanism(), impl_->at); };
+  return ForRows(make, q.rows(), threads, progress, [&](ReducedModel* reduced, Eigen::Index i) {
     RunSummary summary =
-        impl.reduced.Move(q.row(i).transpose(), v.row(i).transpose(), a.row(i).transpose());
-    if (summary.ok()) summary = impl.reduced.AllForces({});
-    if (summary.ok()) drive_forces->row(i) = impl.reduced.sample().drive_force.transpose();
+        reduced->Move(q.row(i).transpose(), v.row(i).transpose(), a.row(i).transpose());
+    if (summary.ok()) summary = reduced->AllForces({});
+    if (summary.ok()) drive_forces->row(i) = reduced->sample().drive_force.transpose();
     return StatusOf(summary);
   });
 }
