@@ -220,4 +220,32 @@ class Solver {
   std::unique_ptr<Impl> impl_;
 };
 
+/// A paper's equations, as a scenario drives them: drive forces as functions of its commands, by the
+/// closed form that its analytic witness takes. No loop is closed numerically.
+class PaperEquations {
+ public:
+  /// `scenario`: MODEL/NAME or a file. Throws InputError where it cannot be read, where no closed
+  /// form applies, and for scenarios with loads, which are functions of time.
+  [[nodiscard]] static PaperEquations Load(const std::string& scenario);
+
+  /// Columns of q, v, a: as the scenario names its commands, ties between drives last.
+  [[nodiscard]] const std::vector<std::string>& commands() const;
+  [[nodiscard]] std::vector<std::string> drives() const;  ///< columns of the forces
+  [[nodiscard]] double duration_s() const;
+
+  /// The scenario's own motion at some times [s]: positions, rates and accelerations of its
+  /// commands, a row per time.
+  void MotionAt(const Eigen::VectorXd& times_s, Eigen::MatrixXd* q, Eigen::MatrixXd* v,
+                Eigen::MatrixXd* a) const;
+  /// Drive forces, rows × drives; blocks and threads as of Solver::InverseDynamicsRows().
+  BatchStatus InverseDynamicsRows(const Eigen::MatrixXd& q, const Eigen::MatrixXd& v,
+                                  const Eigen::MatrixXd& a, Eigen::MatrixXd* drive_forces,
+                                  int threads = 0, const Solver::Progress& progress = {}) const;
+
+ private:
+  struct Data;
+  explicit PaperEquations(std::shared_ptr<const Data> data);
+  std::shared_ptr<const Data> data_;
+};
+
 }  // namespace mbv

@@ -668,8 +668,7 @@ RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
     }
     rates_.setZero(rows_.size());
     PutAtEnd(command.velocity, rows_.size() - joint_rows_, &rates_);
-    Miss(rates_, states_.V_WB);
-    AddMissing(&states_.V_WB);
+    (void)Refine(rates_, 0.0, &states_.V_WB);
     EvaluateHere();
     const Refinement velocity = Refine(rates_, 0.0, &states_.V_WB);
     if (!velocity.began_settled) EvaluateHere();

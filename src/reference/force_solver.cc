@@ -61,8 +61,9 @@ constexpr double kOpens = 1e-9;
 // More self-stresses than this are not looked at one by one.
 constexpr size_t kFewSelfStresses = 24;
 
-int ReactionRows(const Joint& joint, const ConstraintRows& rows) {
-  return joint.transmits_force_only ? rows.translation_rows : rows.rows;
+// Forces only: of joints that lock all translations.
+int ReactionRows(const Joint& joint) {
+  return joint.transmits_force_only ? 3 : 6 - DofsOf(joint.kind);
 }
 
 }  // namespace
@@ -70,7 +71,7 @@ int ReactionRows(const Joint& joint, const ConstraintRows& rows) {
 void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* out) {
   for (const Joint& joint : mechanism.joints) {
     const ConstraintRows rows = RowsOf(joint, states, true);
-    out->Add(rows, ReactionRows(joint, rows));
+    out->Add(rows, ReactionRows(joint));
   }
   for (const CouplingRow& row : CouplingRows(mechanism, states)) out->Add(row);
 }
@@ -264,31 +265,35 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
   return summary;
 }
 
-int FillReactions(const Mechanism& mechanism, const BodyStates& states, const VecX& force,
-                  MatX* reactions) {
+int FillReactions(const Mechanism& mechanism, const BodyStates& states, const RowSet& rows,
+                  const VecX& force, MatX* reactions) {
   const auto joints = static_cast<Eigen::Index>(mechanism.joints.size());
   reactions->setZero(joints, 6);
   int row = 0;
   for (Eigen::Index j = 0; j < joints; ++j) {
     const Joint& joint = mechanism.joints[j];
-    // Wrench on the child about Co in world axes …
+    // Wrench on the moving one of the two bodies about its origin in world axes …
+    const bool on_child = joint.child != 0;
+    const int body = on_child ? joint.child : joint.parent;
     Vec6 wrench = Vec6::Zero();
-    const ConstraintRows rows = RowsOf(joint, states, true);
-    for (int i = 0; i < ReactionRows(joint, rows); ++i) {
-      wrench += force[row++] * rows.J_child.row(i).transpose();
+    for (const int end = row + ReactionRows(joint); row < end; ++row) {
+      for (int p = rows.start[row]; p < rows.start[row + 1]; ++p) {
+        if (rows.body[p] == body) wrench += force[row] * rows.J[p];
+      }
     }
+    if (!on_child) wrench = -wrench;
     // … moved to Mo and turned into F.
-    const Pose& X_WC = states.X_WB[joint.child];
-    const Vec3 p_CoMo = X_WC.linear() * joint.X_CM.translation();
+    Vec3 p_BoMo = states.X_WB[joint.child].linear() * joint.X_CM.translation();
+    if (!on_child) p_BoMo -= states.X_WB[body].translation();
     const Mat3 R_FW = (states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
-    const Vec3 moment = wrench.head<3>() - p_CoMo.cross(wrench.tail<3>());
+    const Vec3 moment = wrench.head<3>() - p_BoMo.cross(wrench.tail<3>());
     reactions->row(j) << (R_FW * wrench.tail<3>()).transpose(), (R_FW * moment).transpose();
   }
   return row + static_cast<int>(mechanism.couplings.size());
 }
 
 void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
-  int row = FillReactions(mechanism_, sample->states, force, &sample->reactions);
+  int row = FillReactions(mechanism_, sample->states, rows_, force, &sample->reactions);
   sample->drive_force = force.segment(row, mechanism_.drives.size());
   row += static_cast<int>(mechanism_.drives.size());
   sample->prescribed_force = force.segment(row, mechanism_.prescribed.size());
@@ -296,7 +301,7 @@ void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
 
 MatX ForceSolver::ReactionsOf(const VecX& force, const BodyStates& states) const {
   MatX reactions;
-  (void)FillReactions(mechanism_, states, force, &reactions);
+  (void)FillReactions(mechanism_, states, rows_, force, &reactions);
   return reactions;
 }
 

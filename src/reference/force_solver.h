@@ -77,9 +77,9 @@ class ForceSolver {
 /// transmit.
 void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* rows);
 /// joints × 6 as ReactionChannels() defines, from the forces of AddReactionRows(), which come
-/// first in `force`; returns their number.
-int FillReactions(const Mechanism& mechanism, const BodyStates& states, const VecX& force,
-                  MatX* reactions);
+/// first in `rows` and `force`; returns their number.
+int FillReactions(const Mechanism& mechanism, const BodyStates& states, const RowSet& rows,
+                  const VecX& force, MatX* reactions);
 
 /// A spring's length and its gradient.
 [[nodiscard]] ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,

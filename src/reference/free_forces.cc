@@ -89,7 +89,7 @@ RunSummary FreeDynamics::CheckLoadsUnique(const ForceRows& at, const BodyStates&
   for (Eigen::Index k = 0; k < at.self_stress.cols(); ++k) {
     const VecX force = at.self_stress.col(k).cwiseProduct(at.scale);
     MatX reactions;
-    (void)FillReactions(mechanism_, states, force, &reactions);
+    (void)FillReactions(mechanism_, states, at.rows, force, &reactions);
     for (const size_t e : loaded_) {
       if (AcrossAxis(mechanism_, e, reactions).norm() <= kBears * force.cwiseAbs().maxCoeff()) {
         continue;
@@ -103,7 +103,8 @@ RunSummary FreeDynamics::CheckLoadsUnique(const ForceRows& at, const BodyStates&
 MatX FreeDynamics::ReactionsBy(const ForceRows& at, const BodyStates& states,
                                const VecX& wrenches) const {
   MatX reactions;
-  (void)FillReactions(mechanism_, states, at.Solve(body_scale_.cwiseProduct(wrenches)), &reactions);
+  (void)FillReactions(mechanism_, states, at.rows, at.Solve(body_scale_.cwiseProduct(wrenches)),
+                      &reactions);
   return reactions;
 }
 
@@ -260,8 +261,9 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
   if (!open && held.size() > 0) wrenches -= HeldRows(states).gradients.transpose() * held;
   const VecX force = at.Solve(body_scale_.cwiseProduct(wrenches));
   const int drives = at.first_prescribed - at.first_driven;
-  MBV_DEMAND(FillReactions(mechanism_, states, force, &sample->reactions) == at.first_driven,
-             at.first_driven);
+  MBV_DEMAND(
+      FillReactions(mechanism_, states, at.rows, force, &sample->reactions) == at.first_driven,
+      at.first_driven);
   sample->drive_force = GivenOr(t_s, force.segment(at.first_driven, drives));
   sample->prescribed_force =
       force.segment(at.first_prescribed, at.first_held - at.first_prescribed);

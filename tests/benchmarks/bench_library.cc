@@ -57,6 +57,18 @@ void Rows(benchmark::State& state, const char* name, int threads) {
   state.SetItemsProcessed(state.iterations() * kRows);
 }
 
+void Equations(benchmark::State& state, const char* scenario) {
+  const PaperEquations equations =
+      PaperEquations::Load(SourcePath(std::string("/scenarios/") + scenario));
+  MatX q, v, a, forces;
+  equations.MotionAt(VecX::LinSpaced(kRows, 0.0, equations.duration_s()), &q, &v, &a);
+  for (auto _ : state) {
+    const BatchStatus status = equations.InverseDynamicsRows(q, v, a, &forces, 0);
+    MBV_DEMAND(status.ok(), status.failed.front().second.message);
+  }
+  state.SetItemsProcessed(state.iterations() * kRows);
+}
+
 void SingleCalls(benchmark::State& state, const char* name) {
   Solver solver = SolverOf(ModelOf(name));
   const Oscillation motion(solver);
@@ -76,6 +88,8 @@ BENCHMARK_CAPTURE(Rows, stewart, "stewart", 1);
 BENCHMARK_CAPTURE(Rows, stewart_all_cores, "stewart", 0)->UseRealTime();
 BENCHMARK_CAPTURE(Rows, platform, "stabilizing_platform", 1);
 BENCHMARK_CAPTURE(Rows, platform_all_cores, "stabilizing_platform", 0)->UseRealTime();
+BENCHMARK_CAPTURE(Equations, platform_all_cores, "stabilizing_platform/sea_state.yaml")
+    ->UseRealTime();
 BENCHMARK_CAPTURE(SingleCalls, stewart, "stewart");
 BENCHMARK_CAPTURE(SingleCalls, platform, "stabilizing_platform");
 

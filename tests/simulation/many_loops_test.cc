@@ -317,7 +317,7 @@ TEST(ManyLoops, ReactionsThatStaticsLeavesOpenAreTheLeastOnes) {
   VecX force = Eigen::CompleteOrthogonalDecomposition<MatX>(MatX(columns)).solve(wrenches);
   for (int i = 0; i < rows.size(); ++i) force[i] *= system.RowScale(rows.angular[i]);
   MatX reactions;
-  (void)internal::FillReactions(mechanism, sample.states, force, &reactions);
+  (void)internal::FillReactions(mechanism, sample.states, rows, force, &reactions);
   const double largest = reactions.cwiseAbs().maxCoeff();
   EXPECT_GT(largest, 1.0);
   EXPECT_LT((sample.reactions - reactions).cwiseAbs().maxCoeff(), 1e-11 * largest);

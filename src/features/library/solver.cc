@@ -7,6 +7,7 @@
 #include <mutex>
 #include <thread>
 
+#include "analytic/closed_form.h"
 #include "base/diagnostics.h"
 #include "base/text.h"
 #include "kinematics/command_rank.h"
@@ -16,6 +17,7 @@
 #include "reference/reduced_model.h"
 #include "scenario/find_model.h"
 #include "verify/model_text.h"
+#include "verify/prepare.h"
 
 namespace mbv {
 namespace {
@@ -29,6 +31,12 @@ Note NoteOf(const Finding& finding) {
           finding.column,
           finding.message,
           finding.hint};
+}
+
+std::vector<Note> NotesOf(const Diagnostics& diagnostics) {
+  std::vector<Note> notes;
+  for (const Finding& finding : diagnostics.findings()) notes.push_back(NoteOf(finding));
+  return notes;
 }
 
 std::string TextOf(const std::vector<Note>& notes) {
@@ -105,8 +113,7 @@ Model Model::Load(const std::string& name, const std::map<std::string, double>& 
   LoadOptions options;
   options.overrides = parameters;
   LoadResult loaded = LoadRobot(*file, options);
-  std::vector<Note> notes;
-  for (const Finding& finding : loaded.diagnostics.findings()) notes.push_back(NoteOf(finding));
+  std::vector<Note> notes = NotesOf(loaded.diagnostics);
   if (!loaded.mechanism) throw InputError(std::move(notes));
   for (const ModelCaveat& caveat : loaded.caveats) {
     notes.push_back({.is_error = false, .file = *file, .message = caveat.text, .hint = {}});
@@ -551,6 +558,88 @@ BatchStatus Solver::InverseDynamicsRows(const MatX& q, const MatX& v, const MatX
         reduced->Move(q.row(i).transpose(), v.row(i).transpose(), a.row(i).transpose());
     if (summary.ok()) summary = reduced->AllForces({});
     if (summary.ok()) drive_forces->row(i) = reduced->sample().drive_force.transpose();
+    return StatusOf(summary);
+  });
+}
+
+struct PaperEquations::Data {
+  Mechanism mechanism;
+  Motion motion;
+  ClosedFormOptions options;
+  ClosedFormFactory factory = nullptr;
+  std::vector<std::string> commands;
+
+  [[nodiscard]] std::unique_ptr<ClosedForm> Make() const {
+    Diagnostics known;  // when it was loaded
+    return factory(mechanism, motion, options, &known);
+  }
+};
+
+PaperEquations::PaperEquations(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+
+PaperEquations PaperEquations::Load(const std::string& scenario) {
+  const std::string file = FindScenario(scenario);
+  Diagnostics found;
+  const auto refuse = [&](const std::string& message) {
+    found.AddError(file, message, "");
+    throw InputError(NotesOf(found));
+  };
+  std::optional<Prepared> prepared = Prepare(file, {}, &found);
+  if (!prepared) throw InputError(NotesOf(found));
+  if (!prepared->has_closed_form()) refuse("no closed form: " + prepared->closed_form.reason);
+  const Scenario& read = prepared->scenario;
+  if (!read.motion.loads.empty()) refuse("the scenario has loads, which are functions of time");
+  auto data = std::make_shared<Data>();
+  data->mechanism = prepared->mechanisms.analytic;
+  data->motion = read.motion;
+  data->options = {.model = read.analytic.model, .as_printed = read.analytic.as_printed};
+  data->factory = FindClosedForm(data->mechanism.name)->factory;
+  data->commands = NamesOf(data->motion.commands);
+  return PaperEquations(std::move(data));
+}
+
+const std::vector<std::string>& PaperEquations::commands() const { return data_->commands; }
+std::vector<std::string> PaperEquations::drives() const { return NamesOf(data_->mechanism.drives); }
+double PaperEquations::duration_s() const { return data_->motion.duration_s; }
+
+void PaperEquations::MotionAt(const VecX& times_s, MatX* q, MatX* v, MatX* a) const {
+  const auto n = static_cast<Eigen::Index>(data_->commands.size());
+  for (MatX* rows : {q, v, a}) rows->resize(times_s.size(), n);
+  CommandSample command;
+  for (Eigen::Index i = 0; i < times_s.size(); ++i) {
+    if (!std::isfinite(times_s[i])) Refuse(fmt::format("times_s[{}] is not finite", i));
+    EvaluateMotion(data_->motion, times_s[i], &command);
+    q->row(i) = command.position.transpose();
+    v->row(i) = command.velocity.transpose();
+    a->row(i) = command.acceleration.transpose();
+  }
+}
+
+BatchStatus PaperEquations::InverseDynamicsRows(const MatX& q, const MatX& v, const MatX& a,
+                                                MatX* drive_forces, int threads,
+                                                const Solver::Progress& progress) const {
+  const auto n = static_cast<Eigen::Index>(data_->commands.size());
+  CheckRows("q", q, q.rows(), n);
+  CheckRows("v", v, q.rows(), n);
+  CheckRows("a", a, q.rows(), n);
+  const auto drives = static_cast<Eigen::Index>(data_->mechanism.drives.size());
+  drive_forces->setConstant(q.rows(), drives, kNan);
+  struct Block {
+    std::unique_ptr<ClosedForm> form;
+    CommandSample command;
+    ClosedFormSample sample;
+  };
+  const auto make = [this] {
+    Block block{.form = data_->Make(), .command = {}, .sample = {}};
+    EvaluateMotion(data_->motion, 0.0, &block.command);
+    return block;
+  };
+  return ForRows(make, q.rows(), threads, progress, [&](Block* block, Eigen::Index i) {
+    block->command.position = q.row(i).transpose();
+    block->command.velocity = v.row(i).transpose();
+    block->command.acceleration = a.row(i).transpose();
+    const RunSummary summary = block->form->Dynamics(block->command, &block->sample);
+    if (summary.ok()) drive_forces->row(i) = block->sample.force.transpose();
     return StatusOf(summary);
   });
 }

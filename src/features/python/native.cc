@@ -141,6 +141,17 @@ py::object Close(Solver* solver, const Array& q, int threads, bool failures_as_n
   return py::cast(std::move(state));
 }
 
+// Positions, rates and accelerations, rows of each.
+struct MotionRows {
+  Eigen::MatrixXd q, v, a;
+
+  MotionRows(const Array& positions, const std::optional<Array>& rates,
+             const std::optional<Array>& accelerations)
+      : q(Rows(positions, "q")),
+        v(RowsOr0(rates, "v", q.rows(), q.cols())),
+        a(RowsOr0(accelerations, "a", q.rows(), q.cols())) {}
+};
+
 py::object InverseDynamics(Solver* solver, const Array& q, const std::optional<Array>& v,
                            const std::optional<Array>& a, const std::vector<Wrench>& loads,
                            int threads, bool failures_as_nan) {
@@ -148,10 +159,9 @@ py::object InverseDynamics(Solver* solver, const Array& q, const std::optional<A
     if (!loads.empty()) {
       throw std::invalid_argument("loads are taken with one state, not with rows");
     }
-    const Eigen::MatrixXd qs = Rows(q, "q"), vs = RowsOr0(v, "v", qs.rows(), qs.cols()),
-                          as = RowsOr0(a, "a", qs.rows(), qs.cols());
+    const MotionRows rows(q, v, a);
     return py::cast(RunRows(failures_as_nan, [&](Eigen::MatrixXd* forces, const auto& goes_on) {
-      return solver->InverseDynamicsRows(qs, vs, as, forces, threads, goes_on);
+      return solver->InverseDynamicsRows(rows.q, rows.v, rows.a, forces, threads, goes_on);
     }));
   }
   Forces forces;
@@ -348,6 +358,42 @@ void DefineSolver(py::module_& m) {
       });
 }
 
+void DefineEquations(py::module_& m) {
+  py::class_<PaperEquations>(m, "PaperEquations",
+                             "A paper's equations, as a scenario drives them: drive forces as "
+                             "functions of its commands, by its closed form.")
+      .def(py::init(&PaperEquations::Load), "scenario"_a,
+           "`scenario`: MODEL/NAME or a file. InputError where no closed form applies.")
+      .def_property_readonly("commands", &PaperEquations::commands,
+                             "Columns of q, v, a: ties between drives last.")
+      .def_property_readonly("drives", &PaperEquations::drives, "Columns of the forces.")
+      .def_property_readonly("duration_s", &PaperEquations::duration_s)
+      .def(
+          "motion",
+          [](const PaperEquations& equations, const Array& times_s) {
+            Eigen::MatrixXd q, v, a;
+            equations.MotionAt(Vector(times_s), &q, &v, &a);
+            return py::make_tuple(RowMajor(q), RowMajor(v), RowMajor(a));
+          },
+          "times_s"_a, "The scenario's own motion: q, v, a, a row per time.")
+      .def(
+          "inverse_dynamics",
+          [](const PaperEquations& equations, const Array& q, const std::optional<Array>& v,
+             const std::optional<Array>& a, int threads, bool failures_as_nan) {
+            const MotionRows rows(q, v, a);
+            return RunRows(failures_as_nan, [&](Eigen::MatrixXd* forces, const auto& goes_on) {
+              return equations.InverseDynamicsRows(rows.q, rows.v, rows.a, forces, threads,
+                                                   goes_on);
+            });
+          },
+          "q"_a, "v"_a = py::none(), "a"_a = py::none(), "threads"_a = 0,
+          "failures_as_nan"_a = false, "Drive forces, rows × drives, of rows × commands.")
+      .def("__repr__", [](const PaperEquations& equations) {
+        return "<mbverify.PaperEquations with " + std::to_string(equations.commands().size()) +
+               " commands, " + std::to_string(equations.drives().size()) + " drives>";
+      });
+}
+
 }  // namespace
 }  // namespace mbv
 
@@ -357,6 +403,7 @@ PYBIND11_MODULE(_native, m) {
   m.doc() = "Native part of mbverify.";
   mbv::DefineModel(m);
   mbv::DefineSolver(m);
+  mbv::DefineEquations(m);
   mbv::Exceptions& raised = mbv::Raised();
   const auto make = [&m](const char* name, const py::object& base, const char* says) {
     const py::object type = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(

@@ -190,6 +190,40 @@ class TheSolver(unittest.TestCase):
         self.assertLess(after - before, 2048)  # [KiB]
 
 
+class TheEquations(unittest.TestCase):
+    def test_are_those_of_a_run(self):
+        scenario = "stabilizing_platform/sea_state"
+        equations = mbverify.PaperEquations(scenario)
+        self.assertEqual(equations.commands[:3], ["roll", "pitch", "heave"])
+        traces = mbverify.run(scenario).traces
+        forces = equations.inverse_dynamics(*equations.motion(traces["time_s"]))
+        for k, drive in enumerate(equations.drives):
+            np.testing.assert_array_equal(forces[:, k], traces[f"{drive}.force.analytic"])
+
+    def test_agree_with_the_solver(self):
+        equations = mbverify.PaperEquations("spr_tripod/harmonic")
+        q, v, a = equations.motion(np.linspace(0, equations.duration_s, 400))
+        solver = mbverify.load("spr_tripod").solver(equations.commands)
+        forces = equations.inverse_dynamics(q, v, a)
+        np.testing.assert_allclose(forces, solver.inverse_dynamics(q, v, a), rtol=1e-9)
+        np.testing.assert_array_equal(forces, equations.inverse_dynamics(q, v, a, threads=1))
+        other = equations.inverse_dynamics(q + 1e-6, v, a)
+        self.assertGreater(abs(other - forces).max(), 1e-7 * abs(forces).max())
+
+    def test_say_where_there_are_none(self):
+        for scenario, says in (
+            ("four_bar/turn", "no closed form: switched off"),
+            ("nowhere/at_all", ""),
+        ):
+            with self.assertRaisesRegex(mbverify.InputError, says):
+                mbverify.PaperEquations(scenario)
+        equations = mbverify.PaperEquations("spr_tripod/harmonic")
+        with self.assertRaisesRegex(ValueError, "q has 2 × 2 values, not 2 × "):
+            equations.inverse_dynamics(np.zeros((2, 2)))
+        with self.assertRaisesRegex(ValueError, "not finite"):
+            equations.motion([0, np.inf])
+
+
 class Stubs(unittest.TestCase):
     def test_declare_what_there_is(self):
         file = pathlib.Path(mbverify.__file__).parent / "_native.pyi"
