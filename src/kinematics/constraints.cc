@@ -31,8 +31,8 @@ class RowWriter {
   void Add(const PairScalar& scalar, double offset = 0.0) {
     const int i = rows_.rows++;
     rows_.residual[i] = scalar.value - offset;
-    rows_.J_parent.row(i) = scalar.J_parent.transpose();
-    rows_.J_child.row(i) = scalar.J_child.transpose();
+    Copy(scalar.J_parent, rows_.J_parent.row(i).data());
+    Copy(scalar.J_child, rows_.J_child.row(i).data());
     rows_.bias[i] = scalar.bias;
   }
   void Translation(const PairScalar& scalar) {
@@ -41,6 +41,14 @@ class RowWriter {
   }
 
  private:
+  // One by one, as they were written: pairs would wait for both stores.
+  static void Copy(const Vec6& from, double* to) {
+    for (int k = 0; k < 6; ++k) {
+      const volatile double& x = from.data()[k];
+      to[k] = x;
+    }
+  }
+
   ConstraintRows& rows_;
 };
 
@@ -62,8 +70,9 @@ Pose At(const Vec3& point) { return Pose(Eigen::Translation3d(point)); }
 
 }  // namespace
 
-ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions) {
-  const FramePair pair = MakePair(states, joint.parent, joint.X_PF, joint.child, joint.X_CM);
+ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions, bool biases) {
+  const FramePair pair =
+      MakePair(states, joint.parent, joint.X_PF, joint.child, joint.X_CM, biases);
   ConstraintRows rows;
   rows.parent = joint.parent;
   rows.child = joint.child;

@@ -24,14 +24,16 @@ struct ConstraintRows {
   int parent = 0, child = 0;
   Vec6 residual = Vec6::Zero();  ///< first `rows` entries: m for translation rows,
                                  ///< direction cosines (≈ rad) for rotation rows
-  Mat6 J_parent = Mat6::Zero();  ///< rows × 6, multiplies V of the parent
-  Mat6 J_child = Mat6::Zero();   ///< rows × 6, multiplies V of the child
-  Vec6 bias = Vec6::Zero();      ///< b in r̈ = J A + b
+  /// rows × 6, multiply V of the parent and of the child
+  Eigen::Matrix<double, 6, 6, Eigen::RowMajor> J_parent = Mat6::Zero(), J_child = Mat6::Zero();
+  Vec6 bias = Vec6::Zero();  ///< b in r̈ = J A + b
 };
 
 /// Rows that a joint imposes (6 − DOFs). With `reactions` true, the isostatic rule is applied:
-/// a joint that transmits a force only has its three translation rows and no others.
-[[nodiscard]] ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions);
+/// a joint that transmits a force only has its three translation rows and no others. `biases`
+/// false: velocities do not count, biases are zero.
+[[nodiscard]] ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions,
+                                    bool biases = true);
 
 /// One scalar coordinate with its Jacobian on two bodies: value, ċ = J V, c̈ = J A + b. Multiplying
 /// Jᵀ by a drive force gives the wrenches (about the body origins, world axes) of the drive.

@@ -27,24 +27,37 @@ LogMap LogMapAt(double theta) {
   return {1.0 / theta2 - cot / (2.0 * theta), slope / theta};
 }
 
+// Written and read in halves: a pair of numbers that two stores left is not there at once.
+void Stack(const Vec3& a, const Vec3& b, Vec6* out) {
+  double* to = out->data();
+  to[0] = a.x(), to[1] = a.y(), to[2] = a.z();
+  to[3] = b.x(), to[4] = b.y(), to[5] = b.z();
+}
+
 }  // namespace
 
 FramePair MakePair(const BodyStates& states, int parent, const Pose& X_PF, int child,
-                   const Pose& X_CM) {
+                   const Pose& X_CM, bool moves) {
   const Pose& X_WP = states.X_WB[parent];
   const Pose& X_WC = states.X_WB[child];
-  const Vec6& V_WP = states.V_WB[parent];
-  const Vec6& V_WC = states.V_WB[child];
   FramePair pair;
-  pair.R_WF = X_WP.linear() * X_PF.linear();
-  pair.R_WM = X_WC.linear() * X_CM.linear();
-  pair.r_F = X_WP.linear() * X_PF.translation();
-  pair.r_M = X_WC.linear() * X_CM.translation();
-  pair.w_P = V_WP.head<3>();
-  pair.w_C = V_WC.head<3>();
+  pair.moves = moves;
+  // No temporaries: read at once, they would wait for their stores.
+  pair.R_WF.noalias() = X_WP.linear() * X_PF.linear();
+  pair.R_WM.noalias() = X_WC.linear() * X_CM.linear();
+  pair.r_F.noalias() = X_WP.linear() * X_PF.translation();
+  pair.r_M.noalias() = X_WC.linear() * X_CM.translation();
   // Differences of origins first: with parent and child far from the world's origin this keeps
   // the digits of the small distance.
   pair.d = (X_WC.translation() - X_WP.translation()) + (pair.r_M - pair.r_F);
+  if (!moves) {
+    for (Vec3* rate : {&pair.w_P, &pair.w_C, &pair.d_rate, &pair.centripetal}) rate->setZero();
+    return pair;
+  }
+  const Vec6& V_WP = states.V_WB[parent];
+  const Vec6& V_WC = states.V_WB[child];
+  pair.w_P = V_WP.head<3>();
+  pair.w_C = V_WC.head<3>();
   const Vec3 v_F = pair.w_P.cross(pair.r_F);
   const Vec3 v_M = pair.w_C.cross(pair.r_M);
   pair.d_rate = (V_WC.tail<3>() - V_WP.tail<3>()) + (v_M - v_F);
@@ -54,11 +67,13 @@ FramePair MakePair(const BodyStates& states, int parent, const Pose& X_PF, int c
 
 PairScalar Along(const FramePair& pair, const Vec3& n_F) {
   const Vec3 n = pair.R_WF * n_F;
-  const Vec3 n_rate = pair.w_P.cross(n);
   PairScalar out;
   out.value = n.dot(pair.d);
-  out.J_child << pair.r_M.cross(n), n;
-  out.J_parent << n.cross(pair.r_F + pair.d), -n;
+  Stack(pair.r_M.cross(n), n, &out.J_child);
+  Stack(n.cross(pair.r_F + pair.d), -n, &out.J_parent);
+  out.bias = 0.0;
+  if (!pair.moves) return out;
+  const Vec3 n_rate = pair.w_P.cross(n);
   out.bias =
       n.dot(pair.centripetal) + 2 * n_rate.dot(pair.d_rate) + pair.w_P.cross(n_rate).dot(pair.d);
   out.rate = n.dot(pair.d_rate) + n_rate.dot(pair.d);
@@ -68,13 +83,15 @@ PairScalar Along(const FramePair& pair, const Vec3& n_F) {
 PairScalar Cosine(const FramePair& pair, const Vec3& f_F, const Vec3& m_M) {
   const Vec3 f = pair.R_WF * f_F;
   const Vec3 m = pair.R_WM * m_M;
-  const Vec3 f_rate = pair.w_P.cross(f);
-  const Vec3 m_rate = pair.w_C.cross(m);
   const Vec3 turn = m.cross(f);  // ċ = (ω_C − ω_P)·(m × f)
   PairScalar out;
   out.value = f.dot(m);
-  out.J_child << turn, Vec3::Zero();
-  out.J_parent << -turn, Vec3::Zero();
+  Stack(turn, Vec3::Zero(), &out.J_child);
+  Stack(-turn, Vec3::Zero(), &out.J_parent);
+  out.bias = 0.0;
+  if (!pair.moves) return out;
+  const Vec3 f_rate = pair.w_P.cross(f);
+  const Vec3 m_rate = pair.w_C.cross(m);
   out.bias = pair.w_P.cross(f_rate).dot(m) + 2 * f_rate.dot(m_rate) + f.dot(pair.w_C.cross(m_rate));
   out.rate = f_rate.dot(m) + f.dot(m_rate);
   return out;

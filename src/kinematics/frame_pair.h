@@ -16,10 +16,11 @@ struct FramePair {
   Vec3 d, d_rate;    ///< from F's origin to M's, and its time derivative
   Vec3 w_P, w_C;     ///< angular velocities
   Vec3 centripetal;  ///< ω_C×(ω_C×r_M) − ω_P×(ω_P×r_F)
+  bool moves;        ///< false: as if at rest, rates and biases are zero
 };
 
 [[nodiscard]] FramePair MakePair(const BodyStates& states, int parent, const Pose& X_PF, int child,
-                                 const Pose& X_CM);
+                                 const Pose& X_CM, bool moves = true);
 
 /// A scalar without the indices of its bodies.
 struct PairScalar {

@@ -92,11 +92,11 @@ ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
   states_.X_WB = mechanism.X_WB_home;
 }
 
-void ClosureSolver::EvaluateRows(Trial* trial) {
+void ClosureSolver::EvaluateRows(Trial* trial, bool biases) {
   rows_are_here_ = false;
   rows_.Clear();
   for (const Joint& joint : mechanism_.joints) {
-    const ConstraintRows rows = RowsOf(joint, trial->states, false);
+    const ConstraintRows rows = RowsOf(joint, trial->states, false, biases);
     rows_.Add(rows, rows.rows);
   }
   first_coupling_ = rows_.size();
@@ -714,7 +714,7 @@ RunSummary ClosureSolver::UnitMotions(int count, MatX* motions) {
 void ClosureSolver::EvaluateHere() {
   trial_.states = states_;
   trial_.near_values = near_values_;
-  EvaluateRows(&trial_);
+  EvaluateRows(&trial_, true);
   rows_are_here_ = true;
 }
 

@@ -52,7 +52,8 @@ class ClosureSolver {
   };
 
   [[nodiscard]] RunSummary Prepare();
-  void EvaluateRows(Trial* trial);
+  /// Of joints without biases, unless they are asked for.
+  void EvaluateRows(Trial* trial, bool biases = false);
   [[nodiscard]] VecX Residual(const VecX& target) const;
   /// Largest of the selected residuals as a multiple of its tolerance; NaN if one is.
   [[nodiscard]] double Openness(const VecX& residual, const VecX& target,

@@ -70,7 +70,7 @@ int ReactionRows(const Joint& joint) {
 
 void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* out) {
   for (const Joint& joint : mechanism.joints) {
-    const ConstraintRows rows = RowsOf(joint, states, true);
+    const ConstraintRows rows = RowsOf(joint, states, true, false);
     out->Add(rows, ReactionRows(joint));
   }
   for (const CouplingRow& row : CouplingRows(mechanism, states)) out->Add(row);
