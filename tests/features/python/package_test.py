@@ -1,13 +1,16 @@
 """The Python package: the solver object, and commands whose results are the program's."""
 
 import ast
+import base64
 import gc
 import importlib.util
 import json
 import os
 import pathlib
+import re
 import resource
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -358,6 +361,22 @@ class Commands(unittest.TestCase):
         del result
         gc.collect()
         self.assertFalse(folder.exists())
+
+    def test_a_card_shows_verdict_checks_and_forces(self):
+        result = mbverify.run("stewart/wave")
+        card = result._repr_html_()
+        self.assertIn("AGREE", card)
+        for check in result.checks:
+            self.assertIn(check["name"], card)
+        drawn = re.search("data:image/png;base64,([^']*)'", card)
+        width, height = struct.unpack(">II", base64.b64decode(drawn.group(1))[16:24])
+        self.assertGreater(min(width, height), 200)
+        other = mbverify.run("stewart/wave", set={"parameters": "{m_platform: 14}"})._repr_html_()
+        self.assertNotEqual(re.search("base64,([^']*)'", other).group(1), drawn.group(1))
+        # Where nothing ran, there is nothing to draw.
+        stopped = mbverify.run("four_bar/must_fail/out_of_reach")
+        self.assertEqual(stopped.verdict, "not_run")
+        self.assertNotIn("<img", stopped._repr_html_())
 
     def test_audit_gives_each_equation(self):
         document = mbverify.audit("spr_tripod")

@@ -1,6 +1,8 @@
 """Commands of the program, with their results as objects."""
 
+import base64
 import csv
+import functools
 import html
 import json
 import os
@@ -107,12 +109,13 @@ class Result:
     `summary` is its summary.json (docs/reference/json.md), `folder` the folder with its files.
     """
 
-    def __init__(self, summary, folder, keep, text):
+    def __init__(self, summary, folder, keep, text, draw=lambda: None):
         self.summary = summary
         self.folder = folder
         self.text = text
         self._keep = keep
         self._traces = None
+        self._draw = functools.cache(draw)
 
     @property
     def verdict(self):
@@ -166,12 +169,17 @@ class Result:
             for check in self.checks
         )
         caveats = "".join(f"<li>{escape(c['text'])}</li>" for c in self.summary.get("caveats", []))
+        picture = self._draw()
+        if picture:
+            data = base64.b64encode(picture).decode("ascii")
+            picture = f"<img alt='drive forces' src='data:image/png;base64,{data}'>"
         colour = {"agree": "#1a7f37", "disagree": "#b42318"}.get(self.verdict, "#8a6d00")
         return (
             f"<div><b style='color:{colour}'>{escape(self.verdict.upper().replace('_', ' '))}</b> "
             f"{escape(name)}<table><tr><th></th><th>check</th><th>value</th><th>limit</th>"
             f"<th>where</th></tr>{rows}</table>"
             + (f"<ul>{caveats}</ul>" if caveats else "")
+            + (picture or "")
             + "</div>"
         )
 
@@ -200,7 +208,19 @@ def run(scenario, *, set=None, out=None, pictures=False, trust=False, progress=F
         raise ValueError(f"{scenario} names {len(results)} scenarios: run() takes one")
     summary = results[0]
     place = folder.path / summary["mechanism"] / summary["scenario"]
-    return Result(summary, place, folder, text)
+    return Result(summary, place, folder, text, lambda: _drive_forces(scenario, set, trust))
+
+
+def _drive_forces(scenario, set, trust):
+    """Their figure as PNG; None where there is none."""
+    with tempfile.TemporaryDirectory(prefix="mbverify_") as folder:
+        try:
+            files = figures(
+                scenario, out=folder, formats=["png"], only=["drive_forces"], set=set, trust=trust
+            )
+        except (_native.InputError, ProgramError):
+            return None
+        return files[0].read_bytes() if files else None
 
 
 def audit(model=None):
@@ -240,8 +260,11 @@ def study(file, *, count=None, seed=None, jobs=None, out=None, progress=False):
     return StudyResult(document, folder.path / document["study"], folder, text)
 
 
-def figures(scenario, *, out, formats=("pdf", "svg"), style=None, only=()):
-    """Figures for a paper of a scenario, in the folder `out`: the paths of the files."""
+def figures(
+    scenario, *, out, formats=("pdf", "svg"), style=None, only=(), set=None, trust=False
+):
+    """Figures for a paper of a scenario, in the folder `out`: the paths of the files. `set` and
+    `trust` as of run()."""
     document, _, _ = _call(
         "figures",
         scenario,
@@ -251,6 +274,8 @@ def figures(scenario, *, out, formats=("pdf", "svg"), style=None, only=()):
         ",".join(formats),
         *(["--style", style] if style else []),
         *(["--only", *only] if only else []),
+        *_set(set),
+        *(["--trust"] if trust else []),
     )
     return [
         pathlib.Path(result["folder"]) / file
