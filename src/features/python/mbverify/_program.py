@@ -172,7 +172,7 @@ class Result:
         picture = self._draw()
         if picture:
             data = base64.b64encode(picture).decode("ascii")
-            picture = f"<img alt='drive forces' src='data:image/png;base64,{data}'>"
+            picture = f"<img alt='drive forces' style='max-width:36em' src='data:image/png;base64,{data}'>"
         colour = {"agree": "#1a7f37", "disagree": "#b42318"}.get(self.verdict, "#8a6d00")
         return (
             f"<div><b style='color:{colour}'>{escape(self.verdict.upper().replace('_', ' '))}</b> "
