@@ -5,6 +5,20 @@ if(MBV_BUILD_TESTS)
   mbv_find(benchmark libbenchmark-dev)
 endif()
 
+# Only mbverify-read-sdf links it.
+if(MBV_WITH_SDF)
+  if(PKG_CONFIG_FOUND)
+    pkg_check_modules(SDFORMAT QUIET IMPORTED_TARGET sdformat12)
+  endif()
+  if(NOT SDFORMAT_FOUND)
+    message(STATUS "libsdformat-dev is not installed: mbverify reads no SDF")
+    set(MBV_WITH_SDF OFF)
+  else()
+    # Its -std=c++17 would go before ours.
+    set_target_properties(PkgConfig::SDFORMAT PROPERTIES INTERFACE_COMPILE_OPTIONS "")
+  endif()
+endif()
+
 # The scripts of the pages (web/) are bundled with npm's packages, unless the sources are those of a
 # release, which has the bundles in web/bundled; tests check their types.
 find_program(NODE NAMES node nodejs)

@@ -35,7 +35,7 @@ void AddRobotOptions(CLI::App* command, RobotArguments* arguments) {
 }
 
 int RefuseRobotOptions() {
-  return Refuse("--assembly, --base and --closure-tolerance are for robots (.urdf, .xml)",
+  return Refuse("--assembly, --base and --closure-tolerance are for robots (.urdf, .xml, .sdf)",
                 "a model file says it itself: guesses of the joints, what is fixed to the world, "
                 "closure_tolerance");
 }

@@ -71,7 +71,7 @@ struct Motor {
 struct ModelCaveat {
   enum class Kind {
     kAllowed,  ///< `allow:`, `closure_tolerance:`
-    kLeftOut   ///< acts on forces in a URDF or MJCF file (`left_out:`)
+    kLeftOut   ///< acts on forces in a robot's file (`left_out:`)
   };
   Kind kind = Kind::kLeftOut;
   std::string text;         ///< a sentence without its subject's file

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "base/names.h"
+#include "base/text.h"
 #include "mechanism/mechanism.h"
 #include "model_file/load_bodies.h"
 #include "model_file/model_bodies.h"
@@ -703,8 +705,7 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
                                      .signals = s.signals,
                                      .urdf_joints = s.urdf.joints};
   internal::ModelReport report(places, &reading->yaml, &reading->others, &reading->caveats);
-  const std::string& file = reading->yaml.file();
-  const bool is_robot = internal::IsUrdfFile(file) || file.ends_with(".xml");
+  const bool is_robot = IsRobotFile(reading->yaml.file());
   internal::CheckMasses(*mechanism,
                         s.head.impossible_inertia_allowed ? internal::Impossible::kAllowed
                         : is_robot                        ? internal::Impossible::kOfRobot
@@ -773,6 +774,18 @@ LoadResult LoadFrom(const std::string& text, Reading reading) {
 }
 
 }  // namespace
+
+bool IsRobotFile(const std::string& file) {
+  return std::ranges::any_of(std::array{".urdf", ".xml", ".sdf", ".xacro"},
+                             [&](const char* ending) { return file.ends_with(ending); });
+}
+
+std::string XacroHint(const std::string& file) {
+  const std::string bare = file.substr(0, file.size() - std::string_view(".xacro").size());
+  return fmt::format("expand it first: xacro {} > {}", ShellWord(file),
+                     ShellWord(bare.ends_with(".urdf") || bare.ends_with(".sdf") ? bare
+                                                                                  : bare + ".urdf"));
+}
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,
                          const LoadOptions& options) {

@@ -40,6 +40,12 @@ struct LoadOptions {
   std::map<std::string, double> literals;
 };
 
+/// Whether a file is a robot of a foreign format (.urdf, .xml, .sdf), by its name, or
+/// becomes one (.xacro).
+[[nodiscard]] bool IsRobotFile(const std::string& file);
+/// "expand it first: xacro X.urdf.xacro > X.urdf", of a file that is to be expanded.
+[[nodiscard]] std::string XacroHint(const std::string& file);
+
 struct LoadResult {
   std::optional<Mechanism> mechanism;  ///< empty when there are errors
   Diagnostics diagnostics;             ///< all findings, warnings included

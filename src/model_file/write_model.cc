@@ -329,6 +329,12 @@ std::string QuotedYaml(const std::string& text) {
   return quoted + "\"";
 }
 
+std::string ForeignModelText(Mechanism mechanism) {
+  mechanism.name = NearestName(mechanism.name);
+  if (mechanism.name.empty()) mechanism.name = "robot";
+  return WriteModel(mechanism);
+}
+
 WrittenNames NamesInModel(const Mechanism& mechanism) {
   WrittenNames names;
   std::set<std::string> bodies = {}, joints, signals;

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/diagnostics.h"
+#include "base/markup.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -32,6 +34,21 @@ struct WrittenNames {
   std::vector<std::string> bodies, joints, drives, outputs;
 };
 [[nodiscard]] WrittenNames NamesInModel(const Mechanism& mechanism);
+
+/// A robot's file of a foreign format as a model, on its way out of a child process.
+struct ForeignModel {
+  std::vector<Finding> findings;
+  std::string model;  ///< text of a model.yaml; "" after errors
+  std::vector<ModelCaveat> left_out;
+  PrintedRounding printed;
+};
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<ForeignModel>& model) {
+  visit(model.findings), visit(model.model), visit(model.left_out);
+  visit(model.printed.length), visit(model.printed.direction);
+}
+/// WriteModel() under the nearest name that a model may have, else "robot".
+[[nodiscard]] std::string ForeignModelText(Mechanism mechanism);
 
 /// In double quotes, for YAML.
 [[nodiscard]] std::string QuotedYaml(const std::string& text);

@@ -8,6 +8,7 @@
 #include "base/diagnostics.h"
 #include "base/files.h"
 #include "base/text.h"
+#include "model_file/load_model.h"
 
 namespace mbv {
 namespace {
@@ -57,8 +58,7 @@ std::optional<fs::path> ShippedFolder() {
 }
 
 bool IsModelPath(const std::string& name) {
-  return name.find('/') != std::string::npos || name.ends_with(".yaml") ||
-         name.ends_with(".urdf") || name.ends_with(".xml");
+  return name.find('/') != std::string::npos || name.ends_with(".yaml") || IsRobotFile(name);
 }
 
 fs::path Absolute(const fs::path& path) {
@@ -124,7 +124,7 @@ std::string ModelHint(const std::string& name, const fs::path& start) {
 std::string FindScenario(const std::string& argument) {
   std::error_code error;
   const std::vector<fs::path> folders = ScenarioFolders();
-  if (fs::exists(argument, error) || argument.ends_with(".yaml") || argument.ends_with(".urdf") ||
+  if (fs::exists(argument, error) || argument.ends_with(".yaml") || IsRobotFile(argument) ||
       argument.empty() || folders.empty() || fs::path(argument).is_absolute()) {
     return argument;
   }

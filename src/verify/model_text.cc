@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "base/names.h"
 #include "base/worker_pool.h"
 #include "external/mechanism_json.h"
 #include "math/bytes.h"
+#include "model_file/sdf/read_sdf.h"
 #include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
 #include "model_file/yaml/yaml_reader.h"
@@ -24,53 +24,54 @@
 namespace mbv {
 namespace {
 
-// A child's answer.
-struct ModelAnswer {
-  std::vector<Finding> findings;
-  std::string model;  // "" after errors
-  std::vector<ModelCaveat> left_out;
-  PrintedRounding printed;
-};
-template <typename Visit>
-void VisitMembers(Visit& visit, typename Visit::template Of<ModelAnswer>& answer) {
-  visit(answer.findings), visit(answer.model), visit(answer.left_out);
-  visit(answer.printed.length), visit(answer.printed.direction);
+bool IsSdf(const std::string& file) { return file.ends_with(".sdf"); }
+
+bool IsXacro(const std::string& file) { return file.ends_with(".xacro"); }
+
+// All but URDF, which model files may name, too.
+bool IsForeign(const std::string& file) {
+  return IsSdf(file) || IsXacro(file) || file.ends_with(".xml");
 }
 
-ModelAnswer ModelAnswerOf(const std::string& text, const std::string& file,
+ForeignModel AnswerOfMjcf(const std::string& text, const std::string& file,
                           const std::string& base) {
   Diagnostics findings;
   auto read = ReadMjcf(text, file, base, &findings);
-  ModelAnswer answer{.findings = findings.findings(), .model = "", .left_out = {}, .printed = {}};
-  if (!read) return answer;
-  Mechanism& mechanism = read->mechanism;
-  mechanism.name = NearestName(mechanism.name);
-  if (mechanism.name.empty()) mechanism.name = "robot";
-  answer.model = WriteModel(mechanism);
-  answer.left_out = std::move(read->left_out);
-  answer.printed = read->printed;
-  return answer;
+  if (!read) return {.findings = findings.findings(), .model = "", .left_out = {}, .printed = {}};
+  return {.findings = findings.findings(),
+          .model = ForeignModelText(std::move(read->mechanism)),
+          .left_out = std::move(read->left_out),
+          .printed = read->printed};
 }
 
-// The model file that an MJCF file stands for, empty after errors, and what it leaves out.
-std::optional<ModelAnswer> ModelOfMjcf(const std::string& file, const std::string& base,
-                                       Diagnostics* findings) {
+ForeignModel ReadInChild(const std::string& text, const std::string& file,
+                         const std::string& base) {
   constexpr double kTimeout_s = 60.0;
+  const auto answers =
+      InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(AnswerOfMjcf(text, file, base)); });
+  if (auto answer = answers[0] ? FromBytes<ForeignModel>(*answers[0]) : std::nullopt) {
+    return std::move(*answer);
+  }
+  Diagnostics findings;
+  findings.AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than {:g} s",
+                                      kTimeout_s));
+  return {.findings = findings.findings(), .model = "", .left_out = {}, .printed = {}};
+}
+
+// The model that an MJCF or SDF file stands for, empty after errors, and what it leaves out.
+std::optional<ForeignModel> ModelOf(const std::string& file, const std::string& base,
+                                    Diagnostics* findings) {
+  if (IsXacro(file)) {
+    findings->AddError(file, "a xacro file is no robot yet", XacroHint(file));
+    return std::nullopt;
+  }
   YamlReader reader(file);
   const auto text = reader.ReadFile();
   findings->Append(reader.diagnostics());
   if (!text) return std::nullopt;
-  const auto answers =
-      InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(ModelAnswerOf(*text, file, base)); });
-  auto answer = answers[0] ? FromBytes<ModelAnswer>(*answers[0]) : std::nullopt;
-  if (!answer) {
-    findings->AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than "
-                                         "{:g} s",
-                                         kTimeout_s));
-    return std::nullopt;
-  }
-  for (const Finding& finding : answer->findings) findings->Add(finding);
-  return findings->has_errors() ? std::nullopt : std::move(answer);
+  ForeignModel model = IsSdf(file) ? ReadSdf(*text, file, base) : ReadInChild(*text, file, base);
+  for (const Finding& finding : model.findings) findings->Add(finding);
+  return findings->has_errors() ? std::nullopt : std::optional(std::move(model));
 }
 
 // Findings point to generated lines.
@@ -81,9 +82,9 @@ void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
   }
 }
 
-LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
+LoadResult LoadForeign(const std::string& file, const LoadOptions& options) {
   LoadResult result;
-  auto answer = ModelOfMjcf(file, options.base, &result.diagnostics);
+  auto answer = ModelOf(file, options.base, &result.diagnostics);
   if (!answer) return result;
   LoadOptions of_text = options;
   of_text.printed = answer->printed;
@@ -98,14 +99,10 @@ LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
 
 }  // namespace
 
-bool IsRobotFile(const std::string& file) {
-  return file.ends_with(".urdf") || file.ends_with(".xml");
-}
-
 LoadedBodies LoadRobotBodies(const std::string& file) {
-  if (!file.ends_with(".xml")) return LoadBodies(file);
+  if (!IsForeign(file)) return LoadBodies(file);
   LoadedBodies result;
-  const auto answer = ModelOfMjcf(file, "", &result.diagnostics);
+  const auto answer = ModelOf(file, "", &result.diagnostics);
   if (!answer) return result;
   LoadedBodies loaded = LoadBodiesText(answer->model, file);
   AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
@@ -114,7 +111,7 @@ LoadedBodies LoadRobotBodies(const std::string& file) {
 }
 
 LoadResult LoadRobot(const std::string& file, const LoadOptions& options) {
-  return file.ends_with(".xml") ? LoadMjcf(file, options) : LoadModel(file, options);
+  return IsForeign(file) ? LoadForeign(file, options) : LoadModel(file, options);
 }
 
 namespace {

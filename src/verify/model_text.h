@@ -13,10 +13,8 @@
 
 namespace mbv {
 
-/// Whether a file is a robot of a foreign format (.urdf, .xml), by its name.
-[[nodiscard]] bool IsRobotFile(const std::string& file);
-
-/// LoadModel(), which takes .urdf, and MJCF (.xml) by MuJoCo's compiler in a process of its own.
+/// LoadModel(), which takes .urdf; MJCF (.xml) by MuJoCo's compiler and SDF (.sdf) by libsdformat,
+/// each in a process of its own.
 [[nodiscard]] LoadResult LoadRobot(const std::string& file, const LoadOptions& options = {});
 
 /// LoadBodies() of the same files.

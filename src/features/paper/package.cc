@@ -245,7 +245,7 @@ std::string RoleOf(const std::string& file) {
     const DocumentKind& kind = KindOf(file);
     return kind.run != nullptr ? "scenario" : kind.name;
   }
-  if (EndsIn(file, {".urdf", ".xml"})) return "model";
+  if (EndsIn(file, {".urdf", ".xml", ".sdf"})) return "model";
   if (EndsIn(file, {".stl", ".STL", ".obj", ".OBJ", ".dae", ".DAE", ".ply", ".PLY"})) return "mesh";
   return EndsIn(file, {".csv", ".txt", ".tab", ".dat"}) ? "table" : "input";
 }

@@ -20,7 +20,7 @@ struct Starter {
 
 struct InitOptions {
   std::string name;               ///< a letter, then letters, digits and '_'
-  std::string from = "four_bar";  ///< of Starters(), or a robot's file (.urdf, .xml)
+  std::string from = "four_bar";  ///< of Starters(), or a robot's file (.urdf, .xml, .sdf)
   std::string into = ".";         ///< folder that gets models/NAME and scenarios/NAME
   LoadOptions load = {};          ///< of a robot
 };

@@ -320,12 +320,17 @@ int WriteSurvey(const SurveyArguments& arguments, const std::vector<SurveyRow>& 
   return exit_code;
 }
 
-// Not all XML is MJCF; parts of models that others include are no robots either.
-bool IsModel(const std::string& file) {
-  if (!file.ends_with(".xml")) return true;
+// Why a file that looks like a robot is passed over; "" of a robot.
+std::string WhySkipped(const std::string& file) {
+  if (file.ends_with(".xacro")) return XacroHint(file);
+  if (file.ends_with(".urdf")) return "";
   const auto text = ReadWholeFile(file);
-  return text && text->find("<mujoco") != std::string::npos &&
-         text->find("<worldbody") != std::string::npos;
+  if (!text) return "it cannot be read";
+  const auto has = [&](const char* tag) { return text->find(tag) != std::string::npos; };
+  if (file.ends_with(".sdf")) return has("<model") || has("<include") ? "" : "it holds no <model>";
+  // Not all XML is MJCF; parts of models that others include are no robots either.
+  if (!has("<mujoco")) return "no MJCF: there is no <mujoco> in it";
+  return has("<worldbody") ? "" : "a part of a model: there is no <worldbody> in it";
 }
 
 std::vector<InputFile> RobotFiles(const std::vector<std::string>& files) {
@@ -338,14 +343,19 @@ std::vector<InputFile> RobotFiles(const std::vector<std::string>& files) {
 int Survey(const SurveyArguments& arguments) {
   std::vector<std::string> unread;
   std::vector<std::string> files;
-  for (const char* ending : {".urdf", ".xml"}) {
+  for (const char* ending : {".urdf", ".xml", ".sdf", ".xacro"}) {
     for (const std::string& file : FilesBelow(arguments.folder, ending, &unread)) {
-      if (IsModel(file)) files.push_back(file);
+      const std::string why = WhySkipped(file);
+      if (why.empty()) {
+        files.push_back(file);
+      } else {
+        unread.push_back(fmt::format("{} is passed over: {}", file, why));
+      }
     }
   }
   for (const std::string& line : unread) Say(stderr, "{}\n", line);
   if (files.empty()) {
-    Say(stderr, "{}: error: no *.urdf and no MJCF file in this folder\n", arguments.folder);
+    Say(stderr, "{}: error: no *.urdf, *.sdf and no MJCF file in this folder\n", arguments.folder);
     return 2;
   }
   const ScratchFolder scratch("survey");
@@ -371,7 +381,7 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<SurveyArguments>();
   CLI::App* survey = app->add_subcommand(
       "survey", "All robots below a folder: do they load, close and agree in a first motion?");
-  survey->add_option("folder", arguments->folder, "folder with .urdf and MJCF files")->required();
+  survey->add_option("folder", arguments->folder, "folder with .urdf, .sdf and MJCF files")->required();
   survey->add_option("--out", arguments->out, "folder for survey.csv and survey.html");
   survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
       ->check(Positive())

@@ -218,7 +218,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<RunArguments>();
   CLI::App* run = app->add_subcommand("run", "Compare analytic, reference and simulated forces");
   run->add_option("scenario", arguments->scenarios,
-                  "scenario files, folders of them, or robots (.urdf, MJCF as .xml)")
+                  "scenario files, folders of them, or robots (.urdf, MJCF as .xml, .sdf)")
       ->required();
   run->add_option("--out", arguments->out, "folder for results")->capture_default_str();
   run->add_option("--mode", arguments->mode, "overrides the scenario's simulation mode")

@@ -320,27 +320,6 @@ const UrdfPluginRow kPluginRows[] = {
     {"sensors_system", nullptr},
 };
 
-const UrdfPluginRow* FindPlugin(std::string name) {
-  for (char& c : name) {
-    c = c == '-' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  }
-  for (const UrdfPluginRow& row : kPluginRows) {
-    if (name.find(row.part) != std::string::npos) return &row;
-  }
-  return nullptr;
-}
-
-bool IsNeutral(const UrdfForceRow& row, const std::string& value) {
-  std::istringstream words(row.neutral);
-  for (std::string word; std::getline(words, word, '|');) {
-    if (value == word) return true;
-  }
-  char* end = nullptr;
-  const double x = std::strtod(value.c_str(), &end);
-  const bool zero_does_nothing = std::string_view(row.neutral).find('0') != std::string_view::npos;
-  return zero_does_nothing && end != value.c_str() && *end == '\0' && x == 0.0;
-}
-
 std::string Trimmed(const char* text) {
   const std::string all = text == nullptr ? "" : text;
   const size_t from = all.find_first_not_of(" \t\r\n"), to = all.find_last_not_of(" \t\r\n");
@@ -448,8 +427,8 @@ class ExtraReader {
     const char* file = plugin.Attribute("filename");
     const char* name = plugin.Attribute("name");
     const std::string word = file != nullptr ? file : name != nullptr ? name : "";
-    const UrdfPluginRow* row = FindPlugin(word);
-    if (row == nullptr && file != nullptr && name != nullptr) row = FindPlugin(name);
+    const UrdfPluginRow* row = FindUrdfPlugin(word);
+    if (row == nullptr && file != nullptr && name != nullptr) row = FindUrdfPlugin(name);
     if (row != nullptr && row->effect == nullptr) return;
     LeaveOut(plugin, word.empty() ? "<plugin>" : "<plugin> " + QuotedValue(word),
              row == nullptr ? "what it does to forces is not known" : row->effect);
@@ -475,7 +454,7 @@ class ExtraReader {
       const char* attribute = of == "text" ? nullptr : e.Attribute(row.value);
       if (of != "text" && attribute == nullptr) continue;
       const std::string value = of == "text" ? Trimmed(e.GetText()) : attribute;
-      if (value.empty() || IsNeutral(row, value)) continue;
+      if (value.empty() || IsNeutralValue(row.neutral, value)) continue;
       LeaveOut(e,
                of == "text" ? fmt::format("<{}> {}", row.element, value)
                             : fmt::format("{} = {} of <{}>", row.value, value, row.element),
@@ -507,6 +486,27 @@ std::string Escaped(const std::string& text) {
 std::span<const UrdfForceRow> UrdfForceRows() { return kForceRows; }
 
 std::span<const UrdfPluginRow> UrdfPluginRows() { return kPluginRows; }
+
+const UrdfPluginRow* FindUrdfPlugin(std::string name) {
+  for (char& c : name) {
+    c = c == '-' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  for (const UrdfPluginRow& row : kPluginRows) {
+    if (name.find(row.part) != std::string::npos) return &row;
+  }
+  return nullptr;
+}
+
+bool IsNeutralValue(const std::string& neutral, const std::string& value) {
+  std::istringstream words(neutral);
+  for (std::string word; std::getline(words, word, '|');) {
+    if (value == word) return true;
+  }
+  char* end = nullptr;
+  const double x = std::strtod(value.c_str(), &end);
+  const bool zero_does_nothing = neutral.find('0') != std::string::npos;
+  return zero_does_nothing && end != value.c_str() && *end == '\0' && x == 0.0;
+}
 
 UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
                             Diagnostics* diagnostics) {

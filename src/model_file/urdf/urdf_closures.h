@@ -67,6 +67,11 @@ struct UrdfPluginRow {
   const char* effect;  ///< nullptr: none on forces, or only those of drives, which are commanded
 };
 [[nodiscard]] std::span<const UrdfPluginRow> UrdfPluginRows();
+/// The row of a plugin's file or name; null without one.
+[[nodiscard]] const UrdfPluginRow* FindUrdfPlugin(std::string name);
+
+/// True for a value that `neutral` lists, separated by |; numbers are compared as such.
+[[nodiscard]] bool IsNeutralValue(const std::string& neutral, const std::string& value);
 
 /// Reads them; findings carry the line. Empty if the text is not XML (urdfdom says so).
 [[nodiscard]] UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
