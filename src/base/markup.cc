@@ -339,6 +339,21 @@ PrintedRounding RoundingOf(std::string_view xml) {
       at = end + 1;
     }
   }
+  // SDF: <pose>x y z roll pitch yaw</pose>.
+  for (size_t at = xml.find("<pose"); at != std::string_view::npos; at = xml.find("<pose", at + 1)) {
+    const size_t open = std::min(xml.find('>', at), xml.size());
+    const std::string_view value = xml.substr(open).substr(0, xml.substr(open).find('<'));
+    int k = 0;
+    for (size_t from = 1; from < value.size();) {
+      const size_t end = std::min(value.find_first_of(" \t\r\n", from), value.size());
+      if (end > from) {
+        const auto d = DecimalsOf(value.substr(from, end - from));
+        if (d) (k < 3 ? lengths : turns).push_back(*d);
+        ++k;
+      }
+      from = end + 1;
+    }
+  }
   const double degree = std::numbers::pi / 180.0;
   return {
       .length = RoundingOf(&lengths),

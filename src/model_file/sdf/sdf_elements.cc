@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <tinyxml2.h>
 #include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -178,6 +181,54 @@ const SdfRow kRows[] = {
 };
 // clang-format on
 
+// Elements that hold numbers, and how many: others are for libsdformat to judge.
+struct NumbersRow {
+  const char* element;  // as of SdfRow
+  size_t count;
+  bool may_be_infinite = false;
+};
+constexpr NumbersRow kNumbers[] = {
+    {"pose", 6},
+    {"world/gravity", 3},
+    {"xyz", 3},
+    {"inertial/mass", 1},
+    {"ixx", 1},
+    {"ixy", 1},
+    {"ixz", 1},
+    {"iyy", 1},
+    {"iyz", 1},
+    {"izz", 1},
+    {"dynamics/damping", 1},
+    {"dynamics/friction", 1},
+    {"spring_reference", 1},
+    {"spring_stiffness", 1},
+    {"thread_pitch", 1},
+    {"screw_thread_pitch", 1},
+    {"gearbox_ratio", 1},
+    {"mimic/multiplier", 1},
+    {"mimic/offset", 1},
+    {"mimic/reference", 1},
+    {"drake:rotor_inertia", 1},
+    {"drake:gear_ratio", 1},
+    {"limit/lower", 1, true},
+    {"limit/upper", 1, true},
+    {"limit/effort", 1, true},
+};
+
+// The numbers of a text; empty where something else stands in it.
+std::optional<std::vector<double>> NumbersIn(const std::string& text) {
+  std::vector<double> numbers;
+  for (const char* at = text.c_str(); *at != '\0';) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(at, &end));
+    if (end == at || (*end != '\0' && std::isspace(static_cast<unsigned char>(*end)) == 0)) {
+      return std::nullopt;
+    }
+    for (at = end; std::isspace(static_cast<unsigned char>(*at)) != 0;) ++at;
+  }
+  return numbers;
+}
+
 bool HasWord(std::string_view words, std::string_view word) {
   while (true) {
     const size_t end = words.find(' ');
@@ -323,6 +374,46 @@ class Inspector {
     }
   }
 
+  void CheckJointType(const XMLElement& joint) {
+    static const std::vector<std::string> kTypes = {"revolute",  "continuous", "prismatic",
+                                                    "ball",      "universal",  "revolute2",
+                                                    "screw",     "fixed",      "gearbox"};
+    const char* type = joint.Attribute("type");
+    if (type != nullptr && Contains(kTypes, type)) return;
+    const char* name = joint.Attribute("name");
+    Refuse(file_, joint.GetLineNum(),
+           fmt::format("joint '{}': type = '{}' is not one of {}", name == nullptr ? "" : name,
+                       QuotedValue(type == nullptr ? "" : type), Joined(kTypes)),
+           DidYouMean(type == nullptr ? "" : type, kTypes));
+  }
+
+  void CheckNumbers(const XMLElement& e, std::string_view element) {
+    const std::string_view tag = element.substr(element.rfind('/') + 1);
+    const auto* row = std::ranges::find_if(kNumbers, [&](const NumbersRow& numbers) {
+      return numbers.element == element || numbers.element == tag;
+    });
+    const std::string text = TrimmedText(e);
+    if (row == std::end(kNumbers) || text.empty()) return;  // SDF has defaults
+    const auto numbers = NumbersIn(text);
+    const bool is_quaternion = e.Attribute("rotation_format") != nullptr;
+    const bool good =
+        numbers && (numbers->size() == row->count || is_quaternion) &&
+        std::ranges::all_of(*numbers, [&](double x) {
+          return std::isfinite(x) || (row->may_be_infinite && !std::isnan(x));
+        });
+    if (good) return;
+    const char* name = nullptr;
+    for (const tinyxml2::XMLNode* at = &e; at != nullptr && name == nullptr; at = at->Parent()) {
+      if (const XMLElement* owner = at->ToElement()) name = owner->Attribute("name");
+    }
+    Refuse(file_, e.GetLineNum(),
+           fmt::format("<{}> '{}' of '{}' is not {}", tag, QuotedValue(text),
+                       name == nullptr ? "" : name,
+                       row->may_be_infinite ? "a number"
+                       : row->count == 1    ? "a finite number"
+                                            : fmt::format("{} finite numbers", row->count)));
+  }
+
   void LookUp(const XMLElement& e, const std::string& parent, std::string scope) {
     const std::string tag = e.Name();
     const std::string element = parent.empty() ? tag : parent + "/" + tag;
@@ -340,6 +431,7 @@ class Inspector {
     }
     if (FindSdfRow(element, "text") != nullptr && tag != "model") {
       NoteUnlessNeutral(e, element, "text", TrimmedText(e));
+      CheckNumbers(e, element);
     }
     for (const auto* a = e.FirstAttribute(); a != nullptr; a = a->Next()) {
       if (std::string_view(a->Name()).starts_with("xmlns")) continue;
@@ -350,6 +442,7 @@ class Inspector {
       return;
     }
     const char* name = e.Attribute("name");
+    if (element == "model/joint") CheckJointType(e);
     if (tag == "model") {
       const std::string own = !model_name_.empty() ? model_name_ : name == nullptr ? "" : name;
       model_name_.clear();  // of the included file's own model
@@ -370,7 +463,7 @@ class Inspector {
     const std::string word = file != nullptr ? file : name != nullptr ? name : "";
     const internal::UrdfPluginRow* row = internal::FindUrdfPlugin(word);
     if (row == nullptr && file != nullptr && name != nullptr) row = internal::FindUrdfPlugin(name);
-    if (row != nullptr && row->effect == nullptr) {
+    if (row != nullptr && row->effect == nullptr) {  // a drive's, or it measures
       const std::string_view part = row->part;
       if (part.find("control") == std::string_view::npos &&
           part.find("trajectory") == std::string_view::npos) {

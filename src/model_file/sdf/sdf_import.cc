@@ -166,8 +166,7 @@ class SdfImporter {
       if (!is_static) {
         known.body = static_cast<int>(m_.bodies.size());
         m_.bodies.push_back(BodyOf(link, scope));
-        X_WB_.resize(m_.bodies.size(), Pose::Identity());
-        X_WB_.back() = known.X_WL;
+        X_WB_.push_back(known.X_WL);
         if (model.CanonicalLinkName() == link.Name()) canonical_.insert(known.body);
       }
       if (!known.X_WL.matrix().allFinite()) {
@@ -339,14 +338,16 @@ class SdfImporter {
         Error(what, fmt::format("joint '{}': its pose is not finite", from.Name()));
         continue;
       }
-      if (MakeKind(from, what, &joint)) Store(of, from, joint);
+      if (!MakeKind(from, what, &joint)) continue;
+      if (joint.kind == JointKind::kUniversal && std::abs(joint.axis.dot(joint.axis2)) > 1e-9) {
+        StoreInSeries(of, from, joint, X_WJ);
+      } else {
+        Store(of, from, joint);
+      }
     }
   }
 
-  [[nodiscard]] const Pose& X_WB(int body) const {
-    static const Pose kWorld = Pose::Identity();
-    return body == 0 ? kWorld : X_WB_[static_cast<size_t>(body)];
-  }
+  [[nodiscard]] const Pose& X_WB(int body) const { return X_WB_[static_cast<size_t>(body)]; }
 
   // The unit axis in the joint's frame; empty after a finding.
   std::optional<Vec3> AxisOf(const sdf::Joint& from, unsigned k, const std::string& what) {
@@ -455,6 +456,36 @@ class SdfImporter {
     }
     index_[of.scope + from.Name()] = index;
     m_.joints.push_back(std::move(joint));
+  }
+
+  // Two hinges whose axes are not perpendicular, with a massless piece between them.
+  void StoreInSeries(const Waiting& of, const sdf::Joint& from, const Joint& both,
+                     const Pose& X_WJ) {
+    const int piece = static_cast<int>(m_.bodies.size());
+    m_.bodies.push_back({.name = both.name + "_piece", .frames = {}, .shapes = {}});
+    X_WB_.push_back(X_WJ);
+    const std::string what = "joint " + of.scope + from.Name();
+    for (unsigned k = 0; k < 2; ++k) {
+      Joint joint = both;
+      joint.name = fmt::format("{}_{}", both.name, k + 1);
+      joint.kind = JointKind::kRevolute;
+      if (k == 0) {
+        joint.child = piece;
+        joint.X_CM = Pose::Identity();
+      } else {
+        joint.parent = piece;
+        joint.X_PF = Pose::Identity();
+        joint.axis = both.axis2;
+      }
+      const int index = static_cast<int>(m_.joints.size());
+      const sdf::JointAxis& axis = *from.Axis(k);
+      ReadLimits(axis, 0, what, &joint);
+      if (joint.kind != JointKind::kFixed) {
+        AddElements(axis, index, 0, joint);
+        scalars_.push_back({index, 0, from.Name(), axis.Effort()});
+      }
+      m_.joints.push_back(std::move(joint));
+    }
   }
 
   // s = lead · θ/2π. Gazebo's thread_pitch counts radians per metre, with the other sign.
@@ -717,7 +748,7 @@ class SdfImporter {
   Diagnostics& diagnostics_;
   Mechanism m_;
   bool prefixed_ = false;             // names begin with their model's
-  std::vector<Pose> X_WB_;            // per body, in the pose of the file
+  std::vector<Pose> X_WB_ = {Pose::Identity()};  // per body, in the pose of the file
   std::map<std::string, Link> links_;  // by MODEL::NAME
   std::map<std::string, int> index_;   // of joints, by MODEL::NAME
   std::set<int> canonical_, followers_;
@@ -746,15 +777,49 @@ class Silence {
   std::streambuf *cerr_, *cout_;
 };
 
-// The file that an error is in: ours where libsdformat read a text.
+// libsdformat reports as text alone: the line of the joint or link that a message quotes.
+void TakeLine(const SdfSource& source, Finding* finding) {
+  for (const SdfSource::Place& place : source.places) {
+    const std::string name = place.name.substr(place.name.find_last_of(" :") + 1);
+    const std::string quoted = place.name.substr(0, place.name.find(' ')) + " with name[" + name;
+    const bool is_it = finding->message.find(quoted + "]") != std::string::npos;
+    if (!is_it) continue;
+    finding->file = place.file;
+    finding->line = place.line;
+    return;
+  }
+}
+
 Finding FindingOf(const sdf::Error& error, const SdfSource& source) {
-  const std::string file = error.FilePath().value_or("");
+  const std::string file = error.FilePath().value_or("");  // none of a text
   Finding finding{.severity = Severity::kError, .file = source.file, .message = {}, .hint = {}};
   if (!file.empty() && file.front() == '/') finding.file = file;
   finding.line = std::max(0, error.LineNumber().value_or(0));
-  finding.column = finding.line > 0 ? 1 : 0;
   finding.message = "libsdformat: " + Shortened(OneLine(error.Message()), 500);
+  if (finding.line == 0) TakeLine(source, &finding);
+  finding.column = finding.line > 0 ? 1 : 0;
   return finding;
+}
+
+// Without those that only follow from others.
+void AddErrors(const sdf::Errors& errors, const SdfSource& source, Diagnostics* found) {
+  using sdf::ErrorCode;
+  const auto has = [&](ErrorCode code) {
+    return std::ranges::any_of(errors, [code](const sdf::Error& e) { return e.Code() == code; });
+  };
+  if (has(ErrorCode::STRING_READ)) {  // the elements around the first follow
+    found->Add(FindingOf(errors.front(), source));
+    return;
+  }
+  std::vector<const sdf::Error*> own, others;
+  for (const sdf::Error& error : errors) {
+    // Of inertias that no body has, the loader knows more.
+    if (error.Code() == ErrorCode::LINK_INERTIA_INVALID) continue;
+    const bool follows = error.Code() == ErrorCode::POSE_RELATIVE_TO_GRAPH_ERROR ||
+                         error.Code() == ErrorCode::FRAME_ATTACHED_TO_GRAPH_ERROR;
+    (follows ? others : own).push_back(&error);
+  }
+  for (const sdf::Error* error : own.empty() ? others : own) found->Add(FindingOf(*error, source));
 }
 
 ForeignModel AnswerOf(const SdfSource& source) {
@@ -785,11 +850,7 @@ ForeignModel AnswerOf(const SdfSource& source) {
   config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::LOG);
   config.SetDeprecatedElementsPolicy(sdf::EnforcementPolicy::LOG);
   sdf::Root root;
-  for (const sdf::Error& error : found.has_errors() ? sdf::Errors{}
-                                                    : root.LoadSdfString(source.text, config)) {
-    // Of inertias that no body has, the loader knows more.
-    if (error.Code() != sdf::ErrorCode::LINK_INERTIA_INVALID) found.Add(FindingOf(error, source));
-  }
+  if (!found.has_errors()) AddErrors(root.LoadSdfString(source.text, config), source, &found);
   if (found.has_errors()) {
     return {.findings = found.findings(), .model = "", .left_out = {}, .printed = {}};
   }
