@@ -4,6 +4,7 @@
 #include <tinyxml2.h>
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -374,6 +375,19 @@ class Inspector {
     }
   }
 
+  void CheckVersion(const XMLElement& sdf) {
+    constexpr unsigned kNewest = 12;  // 1.12
+    const char* version = sdf.Attribute("version");
+    const std::string text = version == nullptr ? "" : version;
+    unsigned minor = 0;
+    const char* end = text.data() + text.size();
+    const bool good = text.starts_with("1.") &&
+                      std::from_chars(text.data() + 2, end, minor).ptr == end && minor <= kNewest;
+    if (good) return;
+    Refuse(file_, sdf.GetLineNum(),
+           fmt::format("version = '{}' of <sdf> is none of 1.0 … 1.{}", QuotedValue(text), kNewest));
+  }
+
   void CheckJointType(const XMLElement& joint) {
     static const std::vector<std::string> kTypes = {"revolute",  "continuous", "prismatic",
                                                     "ball",      "universal",  "revolute2",
@@ -443,6 +457,7 @@ class Inspector {
     }
     const char* name = e.Attribute("name");
     if (element == "model/joint") CheckJointType(e);
+    if (element == "sdf") CheckVersion(e);
     if (tag == "model") {
       const std::string own = !model_name_.empty() ? model_name_ : name == nullptr ? "" : name;
       model_name_.clear();  // of the included file's own model
