@@ -340,7 +340,8 @@ PrintedRounding RoundingOf(std::string_view xml) {
     }
   }
   // SDF: <pose>x y z roll pitch yaw</pose>.
-  for (size_t at = xml.find("<pose"); at != std::string_view::npos; at = xml.find("<pose", at + 1)) {
+  for (size_t at = xml.find("<pose"); at != std::string_view::npos;
+       at = xml.find("<pose", at + 1)) {
     const size_t open = std::min(xml.find('>', at), xml.size());
     const std::string_view value = xml.substr(open).substr(0, xml.substr(open).find('<'));
     int k = 0;

@@ -31,9 +31,9 @@ namespace mbv {
 /// The same as code, `text`, where that can hold it.
 [[nodiscard]] std::string MarkdownCode(std::string_view text);
 
-/// How far the numbers of a robot's XML (URDF, MJCF, SDF) may be from what they were before they were
-/// printed: half a unit of the last decimal of the typical (median) one with four digits or more;
-/// 0 where there is none.
+/// How far the numbers of a robot's XML (URDF, MJCF, SDF) may be from what they were before they
+/// were printed: half a unit of the last decimal of the typical (median) one with four digits or
+/// more; 0 where there is none.
 struct PrintedRounding {
   double length = 0.0;     ///< of positions
   double direction = 0.0;  ///< of angles [rad], quaternions and axes

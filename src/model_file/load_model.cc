@@ -782,9 +782,9 @@ bool IsRobotFile(const std::string& file) {
 
 std::string XacroHint(const std::string& file) {
   const std::string bare = file.substr(0, file.size() - std::string_view(".xacro").size());
-  return fmt::format("expand it first: xacro {} > {}", ShellWord(file),
-                     ShellWord(bare.ends_with(".urdf") || bare.ends_with(".sdf") ? bare
-                                                                                  : bare + ".urdf"));
+  return fmt::format(
+      "expand it first: xacro {} > {}", ShellWord(file),
+      ShellWord(bare.ends_with(".urdf") || bare.ends_with(".sdf") ? bare : bare + ".urdf"));
 }
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,

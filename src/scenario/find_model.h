@@ -17,8 +17,8 @@ extern const char* const kInstalledData;  ///< <prefix>/share/mbverify, as it wa
 [[nodiscard]] std::vector<std::filesystem::path> ModelFolders(const std::filesystem::path& start);
 
 /// Path of a model named as in a scenario: a path (relative to `start`) if it contains '/' or ends
-/// in .yaml, .urdf, .xml or .sdf, otherwise a name looked up in ModelFolders(start). Empty when there is
-/// none.
+/// in .yaml, .urdf, .xml or .sdf, otherwise a name looked up in ModelFolders(start). Empty when
+/// there is none.
 [[nodiscard]] std::optional<std::string> FindModel(const std::string& name,
                                                    const std::filesystem::path& start);
 

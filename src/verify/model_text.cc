@@ -53,8 +53,8 @@ ForeignModel ReadInChild(const std::string& text, const std::string& file,
     return std::move(*answer);
   }
   Diagnostics findings;
-  findings.AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than {:g} s",
-                                      kTimeout_s));
+  findings.AddError(
+      file, fmt::format("MuJoCo's compiler crashed on it, or took longer than {:g} s", kTimeout_s));
   return {.findings = findings.findings(), .model = "", .left_out = {}, .printed = {}};
 }
 

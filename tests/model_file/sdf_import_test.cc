@@ -68,29 +68,30 @@ constexpr const char* kInertia =
 // A base on a stand, an arm on it by a joint of a type, whose content is `axis`; a hand at its end.
 struct Arm {
   std::string type = "revolute";
-  std::string joint = "<axis><xyz>1 2 2</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis>";
+  std::string joint =
+      "<axis><xyz>1 2 2</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis>";
   std::string mass = "2", pose = "0.1 0.2 0.3 0.3 -0.2 0.5", arm = "", more = "", model = "";
 };
 std::string ArmText(const Arm& arm = {}) {
-  return Sdf(arm.model +
-             fmt::format(
-                 "<joint name='mount' type='fixed'><parent>world</parent><child>base</child></joint>"
-                 "<link name='base'><pose>0 0 0.5 0.1 0.2 0.3</pose><inertial><mass>3</mass>{0}"
-                 "</inertial></link>"
-                 "<joint name='j' type='{1}'><parent>base</parent><child>arm</child>{2}</joint>"
-                 "<link name='arm'><pose relative_to='base'>{3}</pose><inertial><pose>0.1 0 0.2 0.4 "
-                 "0.5 0.6</pose><mass>{4}</mass>{0}</inertial>{5}</link>"
-                 "<joint name='k' type='continuous'><parent>arm</parent><child>hand</child><axis>"
-                 "<xyz>0 1 0</xyz></axis></joint>"
-                 "<link name='hand'><pose relative_to='arm'>0 0 0.4 0 0 0</pose><inertial><mass>1"
-                 "</mass>{0}</inertial></link>",
-                 kInertia, arm.type, arm.joint, arm.pose, arm.mass, arm.arm) +
-             arm.more);
+  return Sdf(
+      arm.model +
+      fmt::format(
+          "<joint name='mount' type='fixed'><parent>world</parent><child>base</child></joint>"
+          "<link name='base'><pose>0 0 0.5 0.1 0.2 0.3</pose><inertial><mass>3</mass>{0}"
+          "</inertial></link>"
+          "<joint name='j' type='{1}'><parent>base</parent><child>arm</child>{2}</joint>"
+          "<link name='arm'><pose relative_to='base'>{3}</pose><inertial><pose>0.1 0 0.2 0.4 "
+          "0.5 0.6</pose><mass>{4}</mass>{0}</inertial>{5}</link>"
+          "<joint name='k' type='continuous'><parent>arm</parent><child>hand</child><axis>"
+          "<xyz>0 1 0</xyz></axis></joint>"
+          "<link name='hand'><pose relative_to='arm'>0 0 0.4 0 0 0</pose><inertial><mass>1"
+          "</mass>{0}</inertial></link>",
+          kInertia, arm.type, arm.joint, arm.pose, arm.mass, arm.arm) +
+      arm.more);
 }
 
 // The same as URDF; `joint` is the content of the joint.
-LoadResult LoadUrdf(const std::string& type, const std::string& joint,
-                    const std::string& k = "") {
+LoadResult LoadUrdf(const std::string& type, const std::string& joint, const std::string& k = "") {
   const std::string inertia =
       "<inertia ixx='0.03' iyy='0.04' izz='0.05' ixy='0.001' ixz='0.002' iyz='-0.003'/>";
   const test::TestFolder folder("sdf_urdf");
@@ -124,7 +125,8 @@ std::string Difference(const Mechanism& a, const Mechanism& b) {
     if (far(body.p_BoBcm_B, other.p_BoBcm_B)) return "centre of " + body.name;
     if (far(body.I_Bcm_B, other.I_Bcm_B)) return "inertia of " + body.name;
     const auto& X = a.X_WB_home[static_cast<size_t>(a.FindBody(body.name))];
-    if (far(X.matrix(), b.X_WB_home[static_cast<size_t>(k)].matrix())) return "pose of " + body.name;
+    if (far(X.matrix(), b.X_WB_home[static_cast<size_t>(k)].matrix()))
+      return "pose of " + body.name;
   }
   for (const Joint& joint : a.joints) {
     const int k = b.FindJoint(joint.name);
@@ -175,7 +177,8 @@ TEST(SdfImport, TheJointsOfUrdfAreTheSame) {
       {"revolute", "<axis><xyz>1 2 2</xyz><limit><lower>-1</lower><upper>2</upper></limit></axis>",
        "<axis xyz='1 2 2'/><limit lower='-1' upper='2' effort='1' velocity='1'/>"},
       {"continuous", "<axis><xyz>1 2 2</xyz></axis>", "<axis xyz='1 2 2'/>"},
-      {"prismatic", "<axis><xyz>0 0 1</xyz><limit><lower>0</lower><upper>0.2</upper></limit></axis>",
+      {"prismatic",
+       "<axis><xyz>0 0 1</xyz><limit><lower>0</lower><upper>0.2</upper></limit></axis>",
        "<axis xyz='0 0 1'/><limit lower='0' upper='0.2' effort='1' velocity='1'/>"},
       {"fixed", "", ""},
       {"continuous",
@@ -191,8 +194,8 @@ TEST(SdfImport, TheJointsOfUrdfAreTheSame) {
 }
 
 TEST(SdfImport, AMimicIsACoupling) {
-  const LoadResult urdf = LoadUrdf("continuous", "<axis xyz='1 2 2'/>",
-                                   "<mimic joint='j' multiplier='-2'/>");
+  const LoadResult urdf =
+      LoadUrdf("continuous", "<axis xyz='1 2 2'/>", "<mimic joint='j' multiplier='-2'/>");
   const std::string axis = "<axis><xyz>1 2 2</xyz></axis>";
   std::string text = ArmText({.type = "continuous", .joint = axis});
   const std::string of_hand = "<xyz>0 1 0</xyz>";
@@ -201,8 +204,9 @@ TEST(SdfImport, AMimicIsACoupling) {
     whole.insert(whole.find(of_hand), mimic);
     return whole;
   };
-  const std::string later = "<mimic joint='j'><multiplier>-2</multiplier><offset>{}</offset>"
-                            "<reference>-0.1</reference></mimic>";
+  const std::string later =
+      "<mimic joint='j'><multiplier>-2</multiplier><offset>{}</offset>"
+      "<reference>-0.1</reference></mimic>";
   const std::string drake = "<drake:mimic joint='j' multiplier='-2' offset='{}'/>";
   const auto at = [&](const std::string& mimic, double offset) {
     return ReadText(with(fmt::format(fmt::runtime(mimic), offset)));
@@ -240,17 +244,16 @@ TEST(SdfImport, TheJointsThatUrdfHasNotAreTheSame) {
   of_model.axis2 = of_ball.axis2;
   EXPECT_EQ(Difference(ball, model), "");
   for (const char* type : {"universal", "revolute2"}) {
-    EXPECT_EQ(Difference(ReadText(ArmText({.type = type, .joint = two})),
-                         kind(JointKind::kUniversal)),
-              "")
+    EXPECT_EQ(
+        Difference(ReadText(ArmText({.type = type, .joint = two})), kind(JointKind::kUniversal)),
+        "")
         << type;
   }
   // Gazebo's thread_pitch: radians per metre, positive for left-handed threads; since SDF 1.10
   // metres per revolution, positive for right-handed ones.
   const LoadResult screw = Changed([](Mechanism* m, int j) {
     m->joints[static_cast<size_t>(j)].kind = JointKind::kCylindrical;
-    m->couplings.push_back(
-        {.name = "j_screw", .terms = {{j, 0, {-1.0}}, {j, 1, {0.25}}}});
+    m->couplings.push_back({.name = "j_screw", .terms = {{j, 0, {-1.0}}, {j, 1, {0.25}}}});
   });
   EXPECT_EQ(Difference(ReadText(ArmText({.type = "screw",
                                          .joint = "<thread_pitch>-4</thread_pitch><axis><xyz>1 2 2"
@@ -284,8 +287,8 @@ TEST(SdfImport, AxesThatAreNotPerpendicularAreHingesInSeries) {
 }
 
 TEST(SdfImport, OneOtherNumberIsNoticed) {
-  const LoadResult urdf =
-      LoadUrdf("revolute", "<axis xyz='1 2 2'/><limit lower='-1' upper='2' effort='1' velocity='1'/>");
+  const LoadResult urdf = LoadUrdf(
+      "revolute", "<axis xyz='1 2 2'/><limit lower='-1' upper='2' effort='1' velocity='1'/>");
   ASSERT_EQ(Difference(ReadText(ArmText()), urdf), "");
   EXPECT_EQ(Difference(ReadText(ArmText({.mass = "2.000000001"})), urdf), "mass of arm");
   EXPECT_EQ(Difference(ReadText(ArmText({.pose = "0.1 0.2 0.3 0.3 -0.2 0.500000001"})), urdf),
@@ -313,8 +316,9 @@ TEST(SdfImport, FramesAreResolved) {
   text.replace(text.find("<xyz>1 2 2"), 10, "<xyz expressed_in='base'>1 2 2");
   const LoadResult urdf = [] {
     const test::TestFolder folder("sdf_frames");
-    std::string same = WriteModel(*LoadUrdf("revolute", "<axis xyz='1 2 2'/><limit lower='-1' "
-                                                        "upper='2' effort='1' velocity='1'/>")
+    std::string same = WriteModel(*LoadUrdf("revolute",
+                                            "<axis xyz='1 2 2'/><limit lower='-1' "
+                                            "upper='2' effort='1' velocity='1'/>")
                                        .mechanism);
     return LoadModelText(same, "r.yaml");
   }();
@@ -332,26 +336,28 @@ TEST(SdfImport, FramesAreResolved) {
 // A four-bar of sides 0.3, 0.5, 0.3, 0.5 m whose coupler and rocker have a common joint.
 std::string FourBar(const std::string& more = "", const std::string& of_base = "") {
   const auto rod = [](const char* name, const char* pose, const char* centre, const char* I) {
-    return fmt::format("<link name='{}'><pose>{}</pose><inertial><pose>{}</pose><mass>1</mass>"
-                       "<inertia>{}</inertia></inertial></link>",
-                       name, pose, centre, I);
+    return fmt::format(
+        "<link name='{}'><pose>{}</pose><inertial><pose>{}</pose><mass>1</mass>"
+        "<inertia>{}</inertia></inertial></link>",
+        name, pose, centre, I);
   };
   const auto hinge = [](const char* name, const char* parent, const char* child,
                         const std::string& content = "") {
-    return fmt::format("<joint name='{}' type='continuous'><parent>{}</parent><child>{}</child>"
-                       "<axis><xyz>0 1 0</xyz></axis>{}</joint>",
-                       name, parent, child, content);
+    return fmt::format(
+        "<joint name='{}' type='continuous'><parent>{}</parent><child>{}</child>"
+        "<axis><xyz>0 1 0</xyz></axis>{}</joint>",
+        name, parent, child, content);
   };
   const char* upright = "<ixx>0.01</ixx><iyy>0.01</iyy><izz>0.001</izz>";
-  return Sdf("<link name='base'><inertial><mass>2</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1"
-             "</izz></inertia></inertial>" +
-             of_base + "</link>" + rod("crank", "0 0 0 0 0 0", "0 0 0.15 0 0 0", upright) +
-             rod("coupler", "0 0 0.3 0 0 0", "0.25 0 0 0 0 0",
-                 "<ixx>0.001</ixx><iyy>0.02</iyy><izz>0.02</izz>") +
-             rod("rocker", "0.5 0 0 0 0 0", "0 0 0.15 0 0 0", upright) +
-             hinge("A", "base", "crank") + hinge("B", "crank", "coupler") +
-             hinge("D", "base", "rocker") +
-             hinge("C", "coupler", "rocker", "<pose>0 0 0.3 0 0 0</pose>") + more);
+  return Sdf(
+      "<link name='base'><inertial><mass>2</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1"
+      "</izz></inertia></inertial>" +
+      of_base + "</link>" + rod("crank", "0 0 0 0 0 0", "0 0 0.15 0 0 0", upright) +
+      rod("coupler", "0 0 0.3 0 0 0", "0.25 0 0 0 0 0",
+          "<ixx>0.001</ixx><iyy>0.02</iyy><izz>0.02</izz>") +
+      rod("rocker", "0.5 0 0 0 0 0", "0 0 0.15 0 0 0", upright) + hinge("A", "base", "crank") +
+      hinge("B", "crank", "coupler") + hinge("D", "base", "rocker") +
+      hinge("C", "coupler", "rocker", "<pose>0 0 0.3 0 0 0</pose>") + more);
 }
 
 TEST(SdfImport, ALinkWithTwoParentsClosesALoop) {
@@ -362,8 +368,9 @@ TEST(SdfImport, ALinkWithTwoParentsClosesALoop) {
   EXPECT_EQ(std::ranges::count_if(m.joints, [](const Joint& j) { return j.closure; }), 1);
   // Which joint is cut can be said.
   std::string text = FourBar();
-  text.insert(text.rfind("</joint>"), "<physics><simbody><must_be_loop_joint>true"
-                                      "</must_be_loop_joint></simbody></physics>");
+  text.insert(text.rfind("</joint>"),
+              "<physics><simbody><must_be_loop_joint>true"
+              "</must_be_loop_joint></simbody></physics>");
   const Read cut = ReadText(text);
   ASSERT_TRUE(cut.mechanism) << cut.text;
   EXPECT_TRUE(cut.mechanism->joints[static_cast<size_t>(cut.mechanism->FindJoint("C"))].closure);
@@ -449,9 +456,10 @@ TEST(SdfImport, WorldsHaveGravityAndWhatIsStaticBelongsToThem) {
 
 TEST(SdfImport, ModelsInModelsAndIncludesArePartsOfTheRobot) {
   const test::TestFolder folder("sdf_include");
-  folder.Write("parts/hand.sdf",
-               "<sdf version='1.9'><model name='hand'><link name='palm'><inertial><mass>0.5</mass>" +
-                   std::string(kInertia) + "</inertial></link></model></sdf>");
+  folder.Write(
+      "parts/hand.sdf",
+      "<sdf version='1.9'><model name='hand'><link name='palm'><inertial><mass>0.5</mass>" +
+          std::string(kInertia) + "</inertial></link></model></sdf>");
   const auto with = [](const std::string& uri) {
     return ArmText({.more = "<include><uri>" + uri +
                             "</uri><name>tool</name><pose relative_to='hand'>0 0 0.1 0 0 0</pose>"
@@ -465,8 +473,9 @@ TEST(SdfImport, ModelsInModelsAndIncludesArePartsOfTheRobot) {
   ASSERT_GE(palm, 0) << testing::PrintToString(NamesOf(read.mechanism->bodies));
   EXPECT_EQ(read.mechanism->bodies[static_cast<size_t>(palm)].mass, 0.5);
   // A folder with its model.config.
-  folder.Write("hand/model.config", "<model><sdf version='1.4'>old.sdf</sdf><sdf version='1.9'>"
-                                    "model.sdf</sdf></model>");
+  folder.Write("hand/model.config",
+               "<model><sdf version='1.4'>old.sdf</sdf><sdf version='1.9'>"
+               "model.sdf</sdf></model>");
   std::filesystem::copy_file(folder.PathOf("parts/hand.sdf"), folder.PathOf("hand/model.sdf"));
   EXPECT_TRUE(ReadFile(file, with("model://hand")).mechanism);
   // Nothing else is let in.
@@ -494,12 +503,12 @@ std::map<std::string, Sample> Samples() {
   const auto of_arm = [](const std::string& text) { return ArmText({.arm = text}); };
   const auto of_model = [](const std::string& text) { return ArmText({.more = text}); };
   const auto dynamics = [](const std::string& type, const std::string& text) {
-    return ArmText({.type = type,
-                    .joint = "<axis><xyz>0 0 1</xyz><dynamics>" + text + "</dynamics></axis>"});
+    return ArmText(
+        {.type = type, .joint = "<axis><xyz>0 0 1</xyz><dynamics>" + text + "</dynamics></axis>"});
   };
   const auto ode = [](const std::string& text) {
-    return ArmText({.joint = "<axis><xyz>0 0 1</xyz></axis><physics><ode>" + text +
-                             "</ode></physics>"});
+    return ArmText(
+        {.joint = "<axis><xyz>0 0 1</xyz></axis><physics><ode>" + text + "</ode></physics>"});
   };
   std::string world = ArmText();
   world = world.substr(world.find("<model"), world.find("</sdf>") - world.find("<model"));
@@ -514,19 +523,21 @@ std::map<std::string, Sample> Samples() {
       {"world/joint",
        {in_world("<joint name='j' type='fixed'><parent>world</parent><child>r</child></joint>"),
         in_world("")}},
-      {"model static",
-       {of_model("<static>true</static>"), of_model("<static>false</static>")}},
-      {"floating", {FourBar(), FourBar("<joint name='w' type='fixed'><parent>world</parent><child>"
-                                       "base</child></joint>")}},
+      {"model static", {of_model("<static>true</static>"), of_model("<static>false</static>")}},
+      {"floating",
+       {FourBar(), FourBar("<joint name='w' type='fixed'><parent>world</parent><child>"
+                           "base</child></joint>")}},
       {"model/enable_wind text",
        {of_model("<enable_wind>true</enable_wind>"), of_model("<enable_wind>0</enable_wind>")}},
-      {"model/gripper", {of_model("<gripper name='g'><gripper_link>hand</gripper_link><palm_link>"
-                                  "arm</palm_link></gripper>"),
-                         ArmText()}},
+      {"model/gripper",
+       {of_model("<gripper name='g'><gripper_link>hand</gripper_link><palm_link>"
+                 "arm</palm_link></gripper>"),
+        ArmText()}},
       {"include/experimental:params",
        {of_model("<include><uri>x.sdf</uri><experimental:params/></include>"), ArmText()}},
-      {"plugin", {of_model("<plugin name='p' filename='libunheard.so'/>"),
-                  of_model("<plugin name='p' filename='libgazebo_ros_imu.so'/>")}},
+      {"plugin",
+       {of_model("<plugin name='p' filename='libunheard.so'/>"),
+        of_model("<plugin name='p' filename='libgazebo_ros_imu.so'/>")}},
       {"link/gravity text", {of_arm("<gravity>false</gravity>"), of_arm("<gravity>1</gravity>")}},
       {"link/enable_wind text",
        {of_arm("<enable_wind>1</enable_wind>"), of_arm("<enable_wind>false</enable_wind>")}},
@@ -539,8 +550,9 @@ std::map<std::string, Sample> Samples() {
        {Sdf("<link name='l'><inertial><fluid_added_mass><xx>1</xx></fluid_added_mass></inertial>"
             "</link>"),
         Sdf("<link name='l'><inertial/></link>")}},
-      {"dynamics negative", {dynamics("revolute", "<damping>-0.1</damping>"),
-                             dynamics("revolute", "<damping>0.1</damping>")}},
+      {"dynamics negative",
+       {dynamics("revolute", "<damping>-0.1</damping>"),
+        dynamics("revolute", "<damping>0.1</damping>")}},
       {"axis2/mimic",
        {ArmText({.type = "universal",
                  .joint = "<axis><xyz>0 0 1</xyz></axis><axis2><xyz>0 1 0</xyz><mimic joint='k'/>"
@@ -549,11 +561,13 @@ std::map<std::string, Sample> Samples() {
                  .joint = "<axis><xyz>0 0 1</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>"})}},
       {"ode/max_force text", {ode("<max_force>3</max_force>"), ode("<max_force>0</max_force>")}},
       {"suspension/cfm text",
-       {ode("<suspension><cfm>0.1</cfm></suspension>"), ode("<suspension><cfm>0.0</cfm></suspension>")}},
+       {ode("<suspension><cfm>0.1</cfm></suspension>"),
+        ode("<suspension><cfm>0.0</cfm></suspension>")}},
       {"gearbox",
-       {of_model("<joint name='g' type='gearbox'><parent>base</parent><child>hand</child><axis><xyz>"
-                 "0 0 1</xyz></axis><axis2><xyz>0 0 1</xyz></axis2><gearbox_reference_body>arm"
-                 "</gearbox_reference_body></joint>"),
+       {of_model(
+            "<joint name='g' type='gearbox'><parent>base</parent><child>hand</child><axis><xyz>"
+            "0 0 1</xyz></axis><axis2><xyz>0 0 1</xyz></axis2><gearbox_reference_body>arm"
+            "</gearbox_reference_body></joint>"),
         ArmText()}},
       {"link/drake:deformable_properties", {of_arm("<drake:deformable_properties/>"), ArmText()}},
   };
@@ -570,8 +584,8 @@ std::map<std::string, Sample> Samples() {
     samples[fmt::format("ball {}", value)] = {ball("0.1"), ball("0")};
   }
   for (const char* element :
-       {"joint", "linear_bushing_rpy", "linear_spring_damper", "ball_constraint",
-        "weld_constraint", "distance_constraint", "tendon_constraint", "deformable_properties"}) {
+       {"joint", "linear_bushing_rpy", "linear_spring_damper", "ball_constraint", "weld_constraint",
+        "distance_constraint", "tendon_constraint", "deformable_properties"}) {
     samples[fmt::format("drake:{}", element)] = {
         of_model(fmt::format("<drake:{} name='x'/>", element)), ArmText()};
   }
@@ -661,9 +675,8 @@ TEST(SdfImport, HostileFilesAreErrors) {
   };
   std::string deep = "<sdf version='1.9'><model name='r'>";
   for (int k = 0; k < 150; ++k) deep += "<model name='m'>";
-  const std::string bomb =
-      "<!DOCTYPE b [<!ENTITY a 'aaaaaaaaaa'><!ENTITY b '&a;&a;&a;&a;'>]>" +
-      changed("<mass>2</mass>", "<mass>&b;</mass>");
+  const std::string bomb = "<!DOCTYPE b [<!ENTITY a 'aaaaaaaaaa'><!ENTITY b '&a;&a;&a;&a;'>]>" +
+                           changed("<mass>2</mass>", "<mass>&b;</mass>");
   const std::map<std::string, std::string> texts = {
       {"nothing", ""},
       {"no XML", "name: r"},
@@ -721,10 +734,12 @@ TEST(SdfImport, ShapesAreForPictures) {
     EXPECT_EQ(arm.shapes[0].color, "#ff0000ff");
   }
   const test::TestFolder folder("sdf_mesh");
-  folder.Write("meshes/m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  folder.Write("meshes/m.obj",
+               "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   const auto mesh = [&](const std::string& uri) {
-    return ReadFile(folder.PathOf("robot.sdf"),
-                    ArmText({.arm = visual("<mesh><uri>" + uri + "</uri><scale>2 2 2</scale></mesh>")}));
+    return ReadFile(
+        folder.PathOf("robot.sdf"),
+        ArmText({.arm = visual("<mesh><uri>" + uri + "</uri><scale>2 2 2</scale></mesh>")}));
   };
   for (const char* uri : {"meshes/m.obj", "model://meshes/m.obj", "package://meshes/m.obj"}) {
     const Read read = mesh(uri);
@@ -738,7 +753,8 @@ TEST(SdfImport, ShapesAreForPictures) {
 
 TEST(SdfImport, TheSourceGoesToTheReaderAsItIs) {
   Diagnostics diagnostics;
-  const auto source = InspectSdf(ArmText({.arm = "<gravity>0</gravity>"}), "robot.sdf", &diagnostics);
+  const auto source =
+      InspectSdf(ArmText({.arm = "<gravity>0</gravity>"}), "robot.sdf", &diagnostics);
   ASSERT_TRUE(source) << diagnostics.Text();
   const auto back = FromBytes<SdfSource>(ToBytes(*source));
   ASSERT_TRUE(back);

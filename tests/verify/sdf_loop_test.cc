@@ -30,7 +30,8 @@ std::string FourBarSdf(const std::string& mass = "1") {
 <joint name="base_fixed" type="fixed"><parent>world</parent><child>base</child></joint>
 <link name="crank"><inertial><pose>0 0 0.15 0 0 0</pose><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.001</izz></inertia></inertial></link>
 <link name="coupler"><pose>0 0 0.3 0 0 0</pose><inertial><pose>0.25 0 0 0 0 0</pose><mass>)" +
-         mass + R"(</mass><inertia><ixx>0.001</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial></link>
+         mass +
+         R"(</mass><inertia><ixx>0.001</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial></link>
 <link name="rocker"><pose>0.5 0 0 0 0 0</pose><inertial><pose>0 0 0.15 0 0 0</pose><mass>1</mass><inertia><ixx>0.01</ixx><iyy>0.01</iyy><izz>0.001</izz></inertia></inertial></link>
 <joint name="A" type="continuous"><parent>base</parent><child>crank</child><axis><xyz>0 1 0</xyz></axis></joint>
 <joint name="B" type="continuous"><parent>crank</parent><child>coupler</child><axis><xyz>0 1 0</xyz><limit><effort>0</effort></limit></axis></joint>
@@ -77,8 +78,7 @@ TEST(SdfLoop, ItAgreesInBothModes) {
 TEST(SdfLoop, AXacroFileIsNamedWithTheCommandThatExpandsIt) {
   const LoadResult loaded = LoadRobot("my robot.urdf.xacro");
   EXPECT_FALSE(loaded.mechanism);
-  EXPECT_NE(loaded.diagnostics.Text().find(
-                "xacro 'my robot.urdf.xacro' > 'my robot.urdf'"),
+  EXPECT_NE(loaded.diagnostics.Text().find("xacro 'my robot.urdf.xacro' > 'my robot.urdf'"),
             std::string::npos)
       << loaded.diagnostics.Text();
 }

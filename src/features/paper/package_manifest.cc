@@ -23,22 +23,15 @@ struct MediaType {
   const char* ending;
   const char* type;
 };
-constexpr MediaType kMediaTypes[] = {{".yaml", "application/yaml"},
-                                     {".json", "application/json"},
-                                     {".csv", "text/csv"},
-                                     {".html", "text/html"},
-                                     {".md", "text/markdown"},
-                                     {".xml", "application/xml"},
-                                     {".urdf", "application/xml"},
-                                     {".sdf", "application/xml"},
-                                     {".pdf", "application/pdf"},
-                                     {".svg", "image/svg+xml"},
-                                     {".png", "image/png"},
-                                     {".stl", "model/stl"},
-                                     {".obj", "model/obj"},
-                                     {".dae", "model/vnd.collada+xml"},
-                                     {".py", "text/x-python"},
-                                     {".tex", "text/x-tex"}};
+constexpr MediaType kMediaTypes[] = {
+    {".yaml", "application/yaml"}, {".json", "application/json"},
+    {".csv", "text/csv"},          {".html", "text/html"},
+    {".md", "text/markdown"},      {".xml", "application/xml"},
+    {".urdf", "application/xml"},  {".sdf", "application/xml"},
+    {".pdf", "application/pdf"},   {".svg", "image/svg+xml"},
+    {".png", "image/png"},         {".stl", "model/stl"},
+    {".obj", "model/obj"},         {".dae", "model/vnd.collada+xml"},
+    {".py", "text/x-python"},      {".tex", "text/x-tex"}};
 
 const char* MediaTypeOf(const std::string& path) {
   const auto found = std::ranges::find_if(

@@ -167,7 +167,8 @@ void AddInertiaCommand(CLI::App* app, int* exit_code) {
   CLI::App* inertia = app->add_subcommand(
       "inertia", "Stated masses, centres and tensors against meshes: names the usual mistakes");
   inertia
-      ->add_option("model", arguments->model, "model name, model.yaml, .urdf, MJCF (.xml) or .sdf file")
+      ->add_option("model", arguments->model,
+                   "model name, model.yaml, .urdf, MJCF (.xml) or .sdf file")
       ->required();
   arguments->json.AddTo(inertia);
   SetFooter(inertia, {"inertia my_robot.urdf", "inertia my_robot.urdf --package arm=../arm_ws/arm"},

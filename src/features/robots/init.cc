@@ -243,8 +243,9 @@ void AddInitCommand(CLI::App* app, int* exit_code) {
   }
   CLI::App* init = app->add_subcommand("init", "Write a model and a scenario to start from");
   init->add_option("name", options->name, "name of your mechanism")->required();
-  init->add_option("--from", options->from,
-                   "mechanism to start from: " + names + "; or a robot: FILE.urdf, FILE.xml, FILE.sdf")
+  init->add_option(
+          "--from", options->from,
+          "mechanism to start from: " + names + "; or a robot: FILE.urdf, FILE.xml, FILE.sdf")
       ->capture_default_str();
   init->add_option("--into", options->into, "folder that gets models/ and scenarios/")
       ->capture_default_str();

@@ -247,7 +247,9 @@ int List(const ListArguments& arguments) {
 void AddModelCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<ModelArguments>();
   CLI::App* model = app->add_subcommand("model", "Mobility report, or the generated MJCF or URDF");
-  model->add_option("model", arguments->model, "model name, model.yaml, .urdf, MJCF (.xml) or .sdf file")
+  model
+      ->add_option("model", arguments->model,
+                   "model name, model.yaml, .urdf, MJCF (.xml) or .sdf file")
       ->required();
   model
       ->add_option(

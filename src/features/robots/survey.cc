@@ -381,7 +381,8 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<SurveyArguments>();
   CLI::App* survey = app->add_subcommand(
       "survey", "All robots below a folder: do they load, close and agree in a first motion?");
-  survey->add_option("folder", arguments->folder, "folder with .urdf, .sdf and MJCF files")->required();
+  survey->add_option("folder", arguments->folder, "folder with .urdf, .sdf and MJCF files")
+      ->required();
   survey->add_option("--out", arguments->out, "folder for survey.csv and survey.html");
   survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
       ->check(Positive())

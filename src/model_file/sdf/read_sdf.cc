@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kReader = "mbverify-read-sdf";
 
-// Beside the program, or the library that this is a part of, or one of two folders above (tests, the
-// Python package in a build), else where it was installed.
+// Beside the program, or the library that this is a part of, or one of two folders above (tests,
+// the Python package in a build), else where it was installed.
 fs::path FindSdfReader() {
   std::error_code error;
   Dl_info here;
@@ -48,8 +48,8 @@ fs::path FindSdfReader() {
 // What the reader may know: where libraries and meshes are.
 std::vector<std::string> EnvironmentOfReader() {
   std::vector<std::string> variables;
-  for (const char* name : {"LD_LIBRARY_PATH", "ASAN_OPTIONS", "TMPDIR", "ROS_PACKAGE_PATH",
-                           "AMENT_PREFIX_PATH"}) {
+  for (const char* name :
+       {"LD_LIBRARY_PATH", "ASAN_OPTIONS", "TMPDIR", "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"}) {
     if (const char* value = std::getenv(name)) {
       variables.push_back(fmt::format("{}={}", name, value));
     }
@@ -105,8 +105,7 @@ ForeignModel ReadSdf(const std::string& text, const std::string& file, const std
   findings.insert(findings.end(), model.findings.begin(), model.findings.end());
   model.findings = std::move(findings);
   if (source) {
-    model.left_out.insert(model.left_out.begin(), source->left_out.begin(),
-                          source->left_out.end());
+    model.left_out.insert(model.left_out.begin(), source->left_out.begin(), source->left_out.end());
   }
   model.printed = RoundingOf(text);
   return model;

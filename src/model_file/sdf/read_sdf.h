@@ -1,8 +1,8 @@
 // SDF files (Gazebo's SDFormat) as models.
 //
-// Two steps: the text with all that it includes is looked through here, element by element against a
-// table, and only files of its folder are let in; then libsdformat reads it in mbverify-read-sdf, a
-// program of its own, since the library is slow to load and may crash on hostile files.
+// Two steps: the text with all that it includes is looked through here, element by element against
+// a table, and only files of its folder are let in; then libsdformat reads it in mbverify-read-sdf,
+// a program of its own, since the library is slow to load and may crash on hostile files.
 //
 // An SDF file states the poses of all links, so its loops are closed as it stands: joints are taken
 // in the order of the file, the loader chooses which of them are cut. Joint coordinates are zero in

@@ -336,16 +336,16 @@ class Inspector {
     diagnostics_.Add({Severity::kError, file, line, line > 0 ? 1 : 0, text, hint});
   }
   void Warn(const std::string& file, int line, const std::string& text) {
-    diagnostics_.Add({Severity::kWarning, file, line, line > 0 ? 1 : 0, text,
-                      "forces are computed without it"});
+    diagnostics_.Add(
+        {Severity::kWarning, file, line, line > 0 ? 1 : 0, text, "forces are computed without it"});
   }
 
   static std::string Described(const std::string& element, const std::string& value,
                                const Loss& loss) {
     const std::string tag = element.substr(element.rfind('/') + 1);
     const bool whole = value.empty() || value == "text" || value == "**";
-    return fmt::format("{} ({}{}{})", whole ? fmt::format("<{}>", tag)
-                                            : fmt::format("{} of <{}>", value, tag),
+    return fmt::format("{} ({}{}{})",
+                       whole ? fmt::format("<{}>", tag) : fmt::format("{} of <{}>", value, tag),
                        loss.count, loss.names.empty() ? "" : ": ", Joined(loss.names, 6));
   }
 
@@ -384,14 +384,15 @@ class Inspector {
     const bool good = text.starts_with("1.") &&
                       std::from_chars(text.data() + 2, end, minor).ptr == end && minor <= kNewest;
     if (good) return;
-    Refuse(file_, sdf.GetLineNum(),
-           fmt::format("version = '{}' of <sdf> is none of 1.0 … 1.{}", QuotedValue(text), kNewest));
+    Refuse(
+        file_, sdf.GetLineNum(),
+        fmt::format("version = '{}' of <sdf> is none of 1.0 … 1.{}", QuotedValue(text), kNewest));
   }
 
   void CheckJointType(const XMLElement& joint) {
-    static const std::vector<std::string> kTypes = {"revolute",  "continuous", "prismatic",
-                                                    "ball",      "universal",  "revolute2",
-                                                    "screw",     "fixed",      "gearbox"};
+    static const std::vector<std::string> kTypes = {"revolute", "continuous", "prismatic",
+                                                    "ball",     "universal",  "revolute2",
+                                                    "screw",    "fixed",      "gearbox"};
     const char* type = joint.Attribute("type");
     if (type != nullptr && Contains(kTypes, type)) return;
     const char* name = joint.Attribute("name");
@@ -410,11 +411,10 @@ class Inspector {
     if (row == std::end(kNumbers) || text.empty()) return;  // SDF has defaults
     const auto numbers = NumbersIn(text);
     const bool is_quaternion = e.Attribute("rotation_format") != nullptr;
-    const bool good =
-        numbers && (numbers->size() == row->count || is_quaternion) &&
-        std::ranges::all_of(*numbers, [&](double x) {
-          return std::isfinite(x) || (row->may_be_infinite && !std::isnan(x));
-        });
+    const bool good = numbers && (numbers->size() == row->count || is_quaternion) &&
+                      std::ranges::all_of(*numbers, [&](double x) {
+                        return std::isfinite(x) || (row->may_be_infinite && !std::isnan(x));
+                      });
     if (good) return;
     const char* name = nullptr;
     for (const tinyxml2::XMLNode* at = &e; at != nullptr && name == nullptr; at = at->Parent()) {
@@ -437,9 +437,8 @@ class Inspector {
       return;
     }
     const SdfRow* whole = FindSdfRow(element, "");
-    if (!IsKnownElement(element) ||
-        (whole != nullptr && !whole->imported &&
-         (whole->fate == kLeftOut || whole->fate == kRefused))) {
+    if (!IsKnownElement(element) || (whole != nullptr && !whole->imported &&
+                                     (whole->fate == kLeftOut || whole->fate == kRefused))) {
       Note(e, element, "");
       return;
     }
@@ -490,8 +489,8 @@ class Inspector {
       }
       return;
     }
-    ModelCaveat caveat = LeftOutOfSdf(
-        "plugin", "", word.empty() ? "<plugin>" : "<plugin> " + QuotedValue(word));
+    ModelCaveat caveat =
+        LeftOutOfSdf("plugin", "", word.empty() ? "<plugin>" : "<plugin> " + QuotedValue(word));
     if (row != nullptr) {
       caveat.text = fmt::format("<plugin> {} is left out: {}", QuotedValue(word), row->effect);
     }
@@ -549,8 +548,7 @@ class Inspector {
     if (!text) {
       Refuse(file_, line,
              fmt::format("{} {}", says,
-                         found.outside ? "lies outside the folder of the file"
-                                       : "cannot be read"),
+                         found.outside ? "lies outside the folder of the file" : "cannot be read"),
              "included are files in the folder of the file or below, and in folders that --package "
              "NAME=DIR names; nothing is loaded from the network");
       return;

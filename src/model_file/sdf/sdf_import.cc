@@ -91,11 +91,10 @@ class SdfImporter {
     for (const auto& [what, names] : lost_) {
       LeaveOut(what.first, what.second,
                fmt::format("{} of {} joint{} ({})",
-                           what.first == "gearbox"  ? "the gear ratio"
+                           what.first == "gearbox"     ? "the gear ratio"
                            : what.second == "negative" ? "the negative damping"
                                                        : what.second,
-                           names.size(), names.size() == 1 ? "" : "s",
-                           Joined(names, kMostNames)));
+                           names.size(), names.size() == 1 ? "" : "s", Joined(names, kMostNames)));
     }
   }
 
@@ -128,8 +127,7 @@ class SdfImporter {
   void Add(Severity severity, const std::string& what, const std::string& text,
            const std::string& hint) {
     const SdfSource::Place place = PlaceOf(what);
-    diagnostics_.Add(
-        {severity, place.file, place.line, place.line > 0 ? 1 : 0, text, hint});
+    diagnostics_.Add({severity, place.file, place.line, place.line > 0 ? 1 : 0, text, hint});
   }
   void Error(const std::string& what, const std::string& text, const std::string& hint = "") {
     Add(Severity::kError, what, text, hint);
@@ -198,7 +196,8 @@ class SdfImporter {
     }
   }
 
-  // libsdformat refuses inertias that no body has, which robots' files hold: read from the elements.
+  // libsdformat refuses inertias that no body has, which robots' files hold: read from the
+  // elements.
   Body BodyOf(const sdf::Link& link, const std::string& scope) {
     Body body{.name = NameOf(scope, link.Name()), .frames = {}, .shapes = {}};
     const sdf::ElementPtr element = link.Element();
@@ -229,9 +228,9 @@ class SdfImporter {
     body.I_Bcm_B = 0.5 * (body.I_Bcm_B + body.I_Bcm_B.transpose()).eval();
     if (!std::isfinite(body.mass) || !body.p_BoBcm_B.allFinite() || !body.I_Bcm_B.allFinite() ||
         body.mass < 0.0) {
-      Error("link " + scope + link.Name(),
-            fmt::format("link '{}': its inertial values violate mass >= 0 and finite",
-                        link.Name()));
+      Error(
+          "link " + scope + link.Name(),
+          fmt::format("link '{}': its inertial values violate mass >= 0 and finite", link.Name()));
     }
     for (uint64_t k = 0; k < link.VisualCount(); ++k) AddShape(*link.VisualByIndex(k), &body);
     return body;
@@ -533,9 +532,10 @@ class SdfImporter {
       add("_spring",
           SpringLaw{.polynomial = {axis.SpringStiffness()}, .free = axis.SpringReference()});
     }
-    for (const double x : {axis.Damping(), axis.Friction(), axis.SpringStiffness(),
-                           axis.SpringReference()}) {
-      if (!std::isfinite(x)) Error("", fmt::format("joint '{}': its dynamics are not finite", name));
+    for (const double x :
+         {axis.Damping(), axis.Friction(), axis.SpringStiffness(), axis.SpringReference()}) {
+      if (!std::isfinite(x))
+        Error("", fmt::format("joint '{}': its dynamics are not finite", name));
     }
   }
 
@@ -557,9 +557,10 @@ class SdfImporter {
       const sdf::ElementPtr axis = from.Axis(0) == nullptr ? nullptr : from.Axis(0)->Element();
       if (axis == nullptr) continue;
       for (const char* tag : {"mimic", "drake:mimic"}) {
-        const sdf::ElementPtr mimic = axis->HasElement(tag)             ? axis->FindElement(tag)
-                                      : from.Element()->HasElement(tag) ? from.Element()->FindElement(tag)
-                                                                        : nullptr;
+        const sdf::ElementPtr mimic = axis->HasElement(tag) ? axis->FindElement(tag)
+                                      : from.Element()->HasElement(tag)
+                                          ? from.Element()->FindElement(tag)
+                                          : nullptr;
         if (mimic != nullptr) AddMimic(of, from, mimic);
       }
     }
@@ -575,9 +576,9 @@ class SdfImporter {
       }
       return std::isnan(x) ? otherwise : x;
     };
-    const std::string leader =
-        mimic->HasAttribute("joint") ? mimic->Get<std::string>("joint") : "";
-    const auto follows = index_.find(of.scope + from.Name()), leads = index_.find(of.scope + leader);
+    const std::string leader = mimic->HasAttribute("joint") ? mimic->Get<std::string>("joint") : "";
+    const auto follows = index_.find(of.scope + from.Name()),
+               leads = index_.find(of.scope + leader);
     const auto is_scalar = [&](const auto& found) {
       return found != index_.end() &&
              DofsOf(m_.joints[static_cast<size_t>(found->second)].kind) == 1;
@@ -599,9 +600,10 @@ class SdfImporter {
                               from.Name(), leader, multiplier));
       return;
     }
-    m_.couplings.push_back({.name = NameOf(of.scope, from.Name()) + "_mimic",
-                            .terms = {{follows->second, 0, {-1.0}}, {leads->second, 0, {multiplier}}},
-                            .constant = constant});
+    m_.couplings.push_back(
+        {.name = NameOf(of.scope, from.Name()) + "_mimic",
+         .terms = {{follows->second, 0, {-1.0}}, {leads->second, 0, {multiplier}}},
+         .constant = constant});
     followers_.insert(follows->second);
   }
 
@@ -674,8 +676,9 @@ class SdfImporter {
         Error("", fmt::format("base {}: there is no link of this name", source_.base),
               DidYouMean(source_.base, names));
       } else if (group[static_cast<size_t>(base)] == 0) {
-        Error("", fmt::format("base {}: the link does not float, joints hold it in the world",
-                              source_.base),
+        Error("",
+              fmt::format("base {}: the link does not float, joints hold it in the world",
+                          source_.base),
               "only what nothing ties to the world needs a base");
       }
     }
@@ -699,20 +702,18 @@ class SdfImporter {
       names.push_back(m_.bodies[static_cast<size_t>(b)].name);
     }
     if (!names.empty()) {
-      LeaveOut("floating", "", fmt::format("the freedom of {} in the world",
-                                           Joined(names, kMostNames)));
+      LeaveOut("floating", "",
+               fmt::format("the freedom of {} in the world", Joined(names, kMostNames)));
     }
   }
 
   // Joints that plugins control; else, where the effort of some is limited to nothing, the others.
   void AddDrives() {
-    const bool some_passive = std::ranges::any_of(
-        scalars_, [](const Scalar& scalar) { return scalar.effort == 0.0; });
+    const bool some_passive =
+        std::ranges::any_of(scalars_, [](const Scalar& scalar) { return scalar.effort == 0.0; });
     for (const Scalar& scalar : scalars_) {
       const bool named = Contains(source_.motors, scalar.name);
-      const bool is_driven = source_.motors.empty()
-                                 ? some_passive && scalar.effort != 0.0
-                                 : named;
+      const bool is_driven = source_.motors.empty() ? some_passive && scalar.effort != 0.0 : named;
       const Joint& joint = m_.joints[static_cast<size_t>(scalar.joint)];
       if (!is_driven || followers_.contains(scalar.joint)) continue;
       m_.drives.push_back({.name = joint.name,
@@ -731,9 +732,9 @@ class SdfImporter {
 
   void ReportMeshes() {
     if (missing_ == 0) return;
-    Warn("", fmt::format("{} of {} meshes {} left out: {}{}", missing_, meshes_,
-                         missing_ == 1 ? "is" : "are", missing_text_,
-                         missing_ == 1 ? "" : ", for one"),
+    Warn("",
+         fmt::format("{} of {} meshes {} left out: {}{}", missing_, meshes_,
+                     missing_ == 1 ? "is" : "are", missing_text_, missing_ == 1 ? "" : ", for one"),
          "--package NAME=DIR names folders of meshes");
   }
 
@@ -747,10 +748,10 @@ class SdfImporter {
   const SdfSource& source_;
   Diagnostics& diagnostics_;
   Mechanism m_;
-  bool prefixed_ = false;             // names begin with their model's
+  bool prefixed_ = false;                        // names begin with their model's
   std::vector<Pose> X_WB_ = {Pose::Identity()};  // per body, in the pose of the file
-  std::map<std::string, Link> links_;  // by MODEL::NAME
-  std::map<std::string, int> index_;   // of joints, by MODEL::NAME
+  std::map<std::string, Link> links_;            // by MODEL::NAME
+  std::map<std::string, int> index_;             // of joints, by MODEL::NAME
   std::set<int> canonical_, followers_;
   std::vector<Waiting> models_;
   std::vector<Scalar> scalars_;
@@ -838,7 +839,8 @@ ForeignModel AnswerOf(const SdfSource& source) {
     const std::string own = sdf::findFile(name, true, false, none);
     std::error_code error;
     if (!own.empty() && fs::weakly_canonical(own, error) != fs::path(include.file)) {
-      found.AddError(source.file, fmt::format("include '{}' is {} for libsdformat", include.uri, own),
+      found.AddError(source.file,
+                     fmt::format("include '{}' is {} for libsdformat", include.uri, own),
                      "give the file another name");
     }
   }

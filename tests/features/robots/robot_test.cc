@@ -112,5 +112,26 @@ TEST_F(RobotCommands, ASurveyHasARowForEachAndStopsAtNone) {
   EXPECT_EQ(mbverify("survey " + Path("survey")).exit_code, 2);
 }
 
+TEST_F(RobotCommands, ASurveySaysWhatItPassesOver) {
+  Write("x.urdf.xacro", "<robot/>");
+  Write("launch.xml", "<launch/>");
+  Write("part.xml", "<mujoco/>");
+  Write("light.sdf", "<sdf version='1.9'><light name='sun'/></sdf>");
+  const ProgramResult survey = mbverify("survey " + mbverify.folder().string());
+  for (const char* words :
+       {"x.urdf.xacro is passed over: expand it first: xacro ",
+        "launch.xml is passed over: no MJCF", "part.xml is passed over: a part of a model",
+        "light.sdf is passed over: it holds no <model>"}) {
+    EXPECT_NE(survey.err.find(words), std::string::npos) << words << survey.err;
+  }
+  EXPECT_NE(survey.out.find("1 of 1 ok"), std::string::npos) << survey.out;
+  for (const char* command : {"run ", "check ", "model "}) {
+    const ProgramResult xacro = mbverify(command + Path("x.urdf.xacro"));
+    EXPECT_EQ(xacro.exit_code, 2) << command;
+    EXPECT_NE((xacro.out + xacro.err).find("expand it first: xacro "), std::string::npos)
+        << command << xacro.out << xacro.err;
+  }
+}
+
 }  // namespace
 }  // namespace mbv
