@@ -1,5 +1,5 @@
 // Feeds structurally changed models, scenarios, studies and their results, papers, meshes,
-// archives, URDF and MJCF files and tables to the whole program: it must end by itself with an exit
+// archives, URDF, MJCF and SDF files and tables to the whole program: it must end by itself with an exit
 // code from 0 to 3, in time. (scripts/fuzz_structure)
 //   mutate_files --program FILE --source FOLDER --out FOLDER [--count N] [--seed N] [--jobs N]
 // Inputs that break this stay in OUT/found; each has its seed, with which it is made again.
@@ -71,6 +71,7 @@ class Maker {
     }
     urdfs_ = FilesBelow(source / "tests/fuzz/seeds/urdf", ".urdf");
     mjcfs_ = FilesBelow(source / "tests/fuzz/seeds/mjcf", ".xml");
+    sdfs_ = FilesBelow(source / "tests/fuzz/seeds/sdf", ".sdf");
     tables_ = FilesBelow(source / "scenarios", ".csv");
     for (const fs::path& file : FilesBelow(source / "scenarios", ".yaml")) {
       if (file.filename().string().starts_with("study_")) studies_.push_back(file);
@@ -88,7 +89,7 @@ class Maker {
     Random random(options_.seed * 1000003UL + k);
     Input input;
     input.folder = fs::path(options_.out) / "work" / std::to_string(k);
-    switch (k % 14) {
+    switch (k % 15) {
       case 9:
         Study(&random, &input);
         break;
@@ -103,6 +104,9 @@ class Maker {
         break;
       case 13:
         Mesh(&random, &input);
+        break;
+      case 14:
+        Sdf(&random, &input);
         break;
       case 0:
         Urdf(&random, &input);
@@ -201,10 +205,13 @@ class Maker {
     input->argv = {"model", (input->folder / "model.yaml").string(), "--format", "mjcf"};
   }
 
-  void Mjcf(Random* random, Input* input) const {
-    const fs::path seed = OneOf(mjcfs_, random);
-    const fs::path file = input->folder / "robot.xml";
-    WriteText(file, MutateXml(Read(seed), random));
+  void Mjcf(Random* random, Input* input) const { Robot("robot.xml", mjcfs_, random, input); }
+  void Sdf(Random* random, Input* input) const { Robot("robot.sdf", sdfs_, random, input); }
+
+  static void Robot(const char* name, const std::vector<fs::path>& seeds, Random* random,
+                    Input* input) {
+    const fs::path file = input->folder / name;
+    WriteText(file, MutateXml(Read(OneOf(seeds, random)), random));
     input->argv = {"model", file.string(), "--format", (*random)() % 2 == 0 ? "yaml" : "mjcf"};
   }
 
@@ -370,7 +377,7 @@ class Maker {
   std::vector<ArchiveEntry> packed_;  // what archive_ holds
   fs::path results_;
   std::vector<fs::path> studies_, papers_;
-  std::vector<fs::path> models_, motions_, stiffness_, urdfs_, mjcfs_, tables_;
+  std::vector<fs::path> models_, motions_, stiffness_, urdfs_, mjcfs_, sdfs_, tables_;
 };
 
 // Whether the program kept its promise; a reason if not.
