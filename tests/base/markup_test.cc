@@ -27,6 +27,10 @@ TEST(RoundingOf, IsHalfADecimalOfTheTypicalNumber) {
   EXPECT_DOUBLE_EQ(direction("<body quat='0.7071 0.7071 0 0'/>"), 0.5e-4);
   EXPECT_DOUBLE_EQ(direction("<body euler='12.34 0 0'/>"), 0.5e-2 * std::acos(-1.0) / 180.0);
   EXPECT_DOUBLE_EQ(direction("<compiler angle='radian'/><body euler='12.34 0 0'/>"), 0.5e-2);
+  // SDF writes numbers as text: three lengths, then angles.
+  const char* sdf = "<pose relative_to='a'>0.12345 0 1.54321 -3.141 0 0</pose><pose/><pose>";
+  EXPECT_DOUBLE_EQ(length(sdf), 0.5e-5);
+  EXPECT_DOUBLE_EQ(direction(sdf), 0.5e-3);
 }
 
 }  // namespace

@@ -451,7 +451,11 @@ TEST(SdfImport, WorldsHaveGravityAndWhatIsStaticBelongsToThem) {
   EXPECT_EQ(read.mechanism->FindBody("plane"), -1);
   EXPECT_EQ(read.mechanism->bodies.size(), 4u);
   EXPECT_THAT(ReadText("<sdf version='1.9'><world name='a'/><world name='b'/></sdf>").text,
-              HasSubstr("error"));
+              HasSubstr("the file has 2 worlds"));
+  // A static model in one that moves is not.
+  EXPECT_THAT(SourcesOf(ReadText(ArmText({.more = "<model name='m'><static>true</static>"
+                                                  "<link name='l'/></model>"}))),
+              Contains("model static"));
 }
 
 TEST(SdfImport, ModelsInModelsAndIncludesArePartsOfTheRobot) {

@@ -71,15 +71,14 @@ class SdfImporter {
     prefixed_ = moving > 1 || (moving == 0 && models.size() > 1);
     m_.name = (moving > 0 ? *std::ranges::find_if(models, moves) : models.front())->Name();
     if (prefixed_ && root.WorldCount() == 1) m_.name = root.WorldByIndex(0)->Name();
-    std::vector<std::string> frozen;
     for (const sdf::Model* model : models) {
-      if (moving == 0) frozen.push_back(model->Name());
+      if (moving == 0) frozen_.push_back(model->Name());
       ignition::math::Pose3d pose = model->RawPose();
       if (root.WorldCount() == 1) Check(model->SemanticPose().Resolve(pose), model->Name());
       AddLinks(*model, ToPose(pose), model->Name() + "::", moving > 0 && model->Static());
     }
-    if (!frozen.empty()) {
-      LeaveOut("model", "static", fmt::format("<static> of {}", Joined(frozen, kMostNames)));
+    if (!frozen_.empty()) {
+      LeaveOut("model", "static", fmt::format("<static> of {}", Joined(frozen_, kMostNames)));
     }
     for (const Waiting& waiting : models_) AddJoints(waiting);
     if (diagnostics_.has_errors()) return;
@@ -179,6 +178,7 @@ class SdfImporter {
       if (!Check(inner.SemanticPose().Resolve(pose, "__model__"), "model " + inner.Name())) {
         continue;
       }
+      if (inner.Static() && !is_static) frozen_.push_back(inner.Name());
       AddLinks(inner, X_WM * ToPose(pose), scope + inner.Name() + "::", is_static);
     }
     for (uint64_t k = 0; k < model.FrameCount(); ++k) {
@@ -756,7 +756,7 @@ class SdfImporter {
   std::vector<Waiting> models_;
   std::vector<Scalar> scalars_;
   std::map<std::pair<std::string, std::string>, std::vector<std::string>> lost_;
-  std::vector<std::string> unstated_;
+  std::vector<std::string> unstated_, frozen_;
   std::vector<ModelCaveat> left_out_;
   size_t meshes_ = 0, missing_ = 0;
   std::string missing_text_;
@@ -778,17 +778,15 @@ class Silence {
   std::streambuf *cerr_, *cout_;
 };
 
-// libsdformat reports as text alone: the line of the joint or link that a message quotes.
-void TakeLine(const SdfSource& source, Finding* finding) {
+// libsdformat reports as text alone: the joint or link that it quotes.
+const SdfSource::Place* PlaceQuoted(const SdfSource& source, const std::string& said) {
   for (const SdfSource::Place& place : source.places) {
+    const size_t kind = place.name.find(' ');
     const std::string name = place.name.substr(place.name.find_last_of(" :") + 1);
-    const std::string quoted = place.name.substr(0, place.name.find(' ')) + " with name[" + name;
-    const bool is_it = finding->message.find(quoted + "]") != std::string::npos;
-    if (!is_it) continue;
-    finding->file = place.file;
-    finding->line = place.line;
-    return;
+    const std::string quoted = fmt::format("{} with name[{}]", place.name.substr(0, kind), name);
+    if (said.find(quoted) != std::string::npos) return &place;
   }
+  return nullptr;
 }
 
 Finding FindingOf(const sdf::Error& error, const SdfSource& source) {
@@ -797,7 +795,11 @@ Finding FindingOf(const sdf::Error& error, const SdfSource& source) {
   if (!file.empty() && file.front() == '/') finding.file = file;
   finding.line = std::max(0, error.LineNumber().value_or(0));
   finding.message = "libsdformat: " + Shortened(OneLine(error.Message()), 500);
-  if (finding.line == 0) TakeLine(source, &finding);
+  const SdfSource::Place* place = PlaceQuoted(source, error.Message());
+  if (finding.line == 0 && place != nullptr) {
+    finding.file = place->file;
+    finding.line = place->line;
+  }
   finding.column = finding.line > 0 ? 1 : 0;
   return finding;
 }

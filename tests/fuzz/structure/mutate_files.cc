@@ -1,6 +1,6 @@
 // Feeds structurally changed models, scenarios, studies and their results, papers, meshes,
-// archives, URDF, MJCF and SDF files and tables to the whole program: it must end by itself with an exit
-// code from 0 to 3, in time. (scripts/fuzz_structure)
+// archives, URDF, MJCF and SDF files and tables to the whole program: it must end by itself with an
+// exit code from 0 to 3, in time. (scripts/fuzz_structure)
 //   mutate_files --program FILE --source FOLDER --out FOLDER [--count N] [--seed N] [--jobs N]
 // Inputs that break this stay in OUT/found; each has its seed, with which it is made again.
 #include <fmt/format.h>
