@@ -367,12 +367,11 @@ class Inspector {
   void NoteUnlessNeutral(const XMLElement& e, const std::string& element, const std::string& value,
                          const std::string& content) {
     const SdfRow* row = FindSdfRow(element, value);
-    if (row == nullptr) {
-      Note(e, element, value);
-    } else if ((row->fate == kLeftOut || row->fate == kRefused) && !row->imported &&
-               !(*row->neutral != '\0' && internal::IsNeutralValue(row->neutral, content))) {
-      Note(e, element, value);
-    }
+    const bool counts =
+        row == nullptr || ((row->fate == kLeftOut || row->fate == kRefused) && !row->imported);
+    const bool is_neutral =
+        row != nullptr && *row->neutral != '\0' && internal::IsNeutralValue(row->neutral, content);
+    if (counts && !is_neutral) Note(e, element, value);
   }
 
   void CheckVersion(const XMLElement& sdf) {
