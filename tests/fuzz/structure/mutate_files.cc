@@ -263,7 +263,8 @@ class Maker {
     Diagnostics diagnostics;
     ZipFile zip((folder / "paper.zip").string(), {}, &diagnostics);
     for (const ListedEntry& entry : zip.entries()) {
-      ArchiveEntry& packed = packed_.emplace_back(entry.path, "", entry.executable);
+      packed_.push_back({entry.path, "", entry.executable});
+      ArchiveEntry& packed = packed_.back();
       (void)zip.Read(entry, [&](std::string_view piece) {
         packed.content += piece;
         return true;
