@@ -753,6 +753,18 @@ TEST(SdfImport, ShapesAreForPictures) {
     EXPECT_EQ(std::get<Mesh>(arm.shapes[0].geometry).scale, Vec3(2, 2, 2));
   }
   EXPECT_THAT(mesh("meshes/n.obj").text, HasSubstr("'meshes/n.obj' is not there"));
+  // Of an included file: as seen from there.
+  folder.Write("meshes/tool.sdf",
+               Sdf("<link name='tip'>" + visual("<mesh><uri>m.obj</uri></mesh>") + "</link>"));
+  const Read read = ReadFile(
+      folder.PathOf("robot.sdf"),
+      ArmText({.more = "<include><uri>meshes/tool.sdf</uri><name>tool</name></include><joint "
+                       "name='grip' type='fixed'><parent>hand</parent><child>tool::tip</child>"
+                       "</joint>"}));
+  ASSERT_TRUE(read.mechanism) << read.text;
+  const int tip = read.mechanism->FindBody("tool__tip");
+  ASSERT_GE(tip, 0);
+  EXPECT_EQ(read.mechanism->bodies[static_cast<size_t>(tip)].shapes.size(), 1u) << read.text;
 }
 
 TEST(SdfImport, TheSourceGoesToTheReaderAsItIs) {

@@ -112,6 +112,19 @@ TEST_F(RobotCommands, ASurveyHasARowForEachAndStopsAtNone) {
   EXPECT_EQ(mbverify("survey " + Path("survey")).exit_code, 2);
 }
 
+TEST_F(RobotCommands, ABadSdfFileIsBadInput) {
+  Write("bad.sdf",
+        "<sdf version='1.9'><model name='m'>\n<link name='a'><inertial><mass>x</mass>"
+        "</inertial></link></model></sdf>");
+  for (const char* command : {"run ", "check ", "model ", "init new_robot --from "}) {
+    const ProgramResult bad = mbverify(command + Path("bad.sdf"));
+    EXPECT_EQ(bad.exit_code, 2) << command;
+    EXPECT_NE((bad.out + bad.err).find("bad.sdf:2:1: error: <mass> 'x' of 'a' is not a finite"),
+              std::string::npos)
+        << command << bad.out << bad.err;
+  }
+}
+
 TEST_F(RobotCommands, ASurveySaysWhatItPassesOver) {
   Write("x.urdf.xacro", "<robot/>");
   Write("launch.xml", "<launch/>");
