@@ -33,6 +33,8 @@ class ClosureSolver {
   [[nodiscard]] RunSummary Solve(const CommandSample& command);
 
   [[nodiscard]] const BodyStates& states() const { return states_; }
+  /// Of all joints, then couplings, at the pose of states(); behind them others.
+  [[nodiscard]] const RowSet& rows() const { return rows_; }
 
   /// Other velocities and accelerations at the pose of states().
   [[nodiscard]] RunSummary SolveRates(const CommandSample& command);

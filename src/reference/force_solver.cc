@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -82,12 +83,17 @@ ForceSolver::ForceSolver(const Mechanism& mechanism, double duration_s)
       lever_(LongestLever(mechanism)),
       duration_s_(duration_s),
       system_(mechanism.bodies.size(), length_),
-      spins_(IdleSpins(mechanism)) {}
+      spins_(IdleSpins(mechanism)),
+      closed_by_reactions_(std::ranges::none_of(mechanism.joints, &Joint::transmits_force_only)) {}
 
-void ForceSolver::FillRows(const BodyStates& states) {
-  rows_.Clear();
-  AddReactionRows(mechanism_, states, &rows_);
-  first_driven_ = rows_.size();
+void ForceSolver::FillRows(const BodyStates& states, const RowSet* closed) {
+  if (closed != nullptr && closed_by_reactions_ && chosen_) {
+    rows_.Take(*closed, first_driven_);
+  } else {
+    rows_.Clear();
+    AddReactionRows(mechanism_, states, &rows_);
+    first_driven_ = rows_.size();
+  }
   for (const Drive& drive : mechanism_.drives) {
     rows_.Add(DriveRow(mechanism_, drive, states), PositionUnit(mechanism_, drive) == "rad");
   }
@@ -127,7 +133,7 @@ void ForceSolver::SelectAtHome() {
   BodyStates home;
   home.Resize(mechanism_.bodies.size());
   home.X_WB = mechanism_.X_WB_home;
-  FillRows(home);
+  FillRows(home, nullptr);
   (void)SelectBasis();
 }
 
@@ -216,9 +222,10 @@ VecX ForceSolver::LeastNorm(const VecX& wrenches) {
   return scale.cwiseProduct(scaled);
 }
 
-RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample) {
+RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample,
+                              const RowSet* closed) {
   if (!chosen_) SelectAtHome();
-  FillRows(sample->states);
+  FillRows(sample->states, closed);
   std::vector<Vec6> required;
   sample->friction_signs = FrictionDirections(mechanism_, sample->states, duration_s_);
   RequiredWrenches(mechanism_, sample->states, loads, sample->friction_signs, &required);

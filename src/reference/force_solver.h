@@ -37,11 +37,13 @@ class ForceSolver {
   /// Fills forces, bands, reactions and the power audit of `sample` from its states and driven
   /// motion. Where the equations leave a choice, TakeLeastForces() decides. Friction at rest is
   /// zero in forces and reactions; a band is Σ |∂(drive force)/∂(friction)| Fs over what rests, Fs
-  /// by the load of the middle.
-  [[nodiscard]] RunSummary Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample);
+  /// by the load of the middle. `closed`: rows of all joints and couplings at these states, where
+  /// the loop closure has them at hand.
+  [[nodiscard]] RunSummary Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample,
+                                 const RowSet* closed = nullptr);
 
  private:
-  void FillRows(const BodyStates& states);
+  void FillRows(const BodyStates& states, const RowSet* closed);
   void SelectAtHome();
   [[nodiscard]] RunSummary SelectBasis();
   [[nodiscard]] bool Factor();
@@ -61,7 +63,8 @@ class ForceSolver {
   const Mechanism& mechanism_;
   const double length_, lever_, duration_s_;
   SquareSystem system_;
-  const std::vector<Spin> spins_;  ///< idle
+  const std::vector<Spin> spins_;   ///< idle
+  const bool closed_by_reactions_;  ///< all that a joint locks it can transmit
   RowSet rows_;  ///< AddReactionRows(), drives, prescribed joints, idle spins: these are given none
   int first_driven_ = 0;  ///< row of the first drive
   std::vector<int> basis_, rest_;

@@ -191,7 +191,7 @@ MatX ReducedModel::DriveRates(const MatX& T) const {
 }
 
 RunSummary ReducedModel::AllForces(const std::vector<LoadSample>& loads) {
-  return impl_->forces->Solve(loads, &impl_->sample);
+  return impl_->forces->Solve(loads, &impl_->sample, &impl_->closure->rows());
 }
 
 }  // namespace mbv

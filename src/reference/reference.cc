@@ -35,7 +35,7 @@ RunSummary ReferenceSolver::Kinematics(const CommandSample& command, ReferenceSa
 
 RunSummary ReferenceSolver::Dynamics(const CommandSample& command, ReferenceSample* sample) {
   if (RunSummary summary = Kinematics(command, sample); !summary.ok()) return summary;
-  RunSummary summary = impl_->forces.Solve(command.loads, sample);
+  RunSummary summary = impl_->forces.Solve(command.loads, sample, &impl_->closure.rows());
   if (!summary.ok()) summary.time_s = command.time_s;
   return summary;
 }

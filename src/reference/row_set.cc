@@ -14,6 +14,16 @@ void RowSet::Clear() {
   angular.clear();
 }
 
+void RowSet::Take(const RowSet& other, int count) {
+  const int pieces = other.start[static_cast<size_t>(count)];
+  start.assign(other.start.begin(), other.start.begin() + count + 1);
+  body.assign(other.body.begin(), other.body.begin() + pieces);
+  J.assign(other.J.begin(), other.J.begin() + pieces);
+  value.assign(other.value.begin(), other.value.begin() + count);
+  bias.assign(other.bias.begin(), other.bias.begin() + count);
+  angular.assign(other.angular.begin(), other.angular.begin() + count);
+}
+
 void RowSet::AddPiece(int body_index, const Vec6& J_piece) {
   if (body_index == 0) return;
   // Insert in order, or add to the piece of the same body.
