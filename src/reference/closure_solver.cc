@@ -599,8 +599,9 @@ constexpr double kRatesMiss = 4 * kEps;
 constexpr double kRatesGood = 1e-12, kRatesAccurate = 1e-9;
 constexpr double kBiasRounding = 32 * kEps;
 constexpr int kMostSolutions = 12;
-// Velocities that missed by more when the biases were evaluated have changed these.
-constexpr double kRatesSettled = 1e-13;
+// Velocities that changed by more of themselves since biases were evaluated have changed these.
+// What they missed does not tell: near singular poses little that misses is much that changes.
+constexpr double kRatesSettled = 1e-14;
 
 // Of the command rows; those of idle spins, behind them, are zero.
 void PutAtEnd(const VecX& values, Eigen::Index count, VecX* rates) {
@@ -624,11 +625,12 @@ double ClosureSolver::Miss(const VecX& rates, const std::vector<Vec6>& per_body)
   return std::max(largest_rad, largest_m / length_);
 }
 
-void ClosureSolver::AddMissing(std::vector<Vec6>* per_body) {
+double ClosureSolver::AddMissing(std::vector<Vec6>* per_body) {
   const VecX change = system_.SolveTransposed(missing_);
   for (size_t b = 1; b < per_body->size(); ++b) {
     (*per_body)[b] += change.segment<6>(6 * (static_cast<Eigen::Index>(b) - 1));
   }
+  return SizeOf(change, length_);
 }
 
 // The factors belong to a pose nearby; refinement against the true rows restores all digits.
@@ -642,7 +644,6 @@ ClosureSolver::Refinement ClosureSolver::Refine(const VecX& rates, double round_
   double previous = std::numeric_limits<double>::infinity();
   for (int solutions = 0;; ++solutions) {
     const double largest = Miss(rates, *per_body);
-    if (solutions == 0) refinement.began_settled = largest <= kRatesSettled * scale;
     if (scale == 0.0 && !std::isnan(largest)) {  // exactly, where sums leave round-off
       std::ranges::fill(*per_body, Vec6::Zero());
       refinement.accurate = true;
@@ -651,7 +652,7 @@ ClosureSolver::Refinement ClosureSolver::Refine(const VecX& rates, double round_
     refinement.accurate = largest <= std::max(kRatesAccurate * scale, round_off);
     if (largest <= kRatesMiss * scale || solutions == kMostSolutions) break;
     if (largest < std::max(kRatesGood * scale, round_off) && largest > 0.1 * previous) break;
-    AddMissing(per_body);
+    refinement.change += AddMissing(per_body);
     previous = largest;
   }
   return refinement;
@@ -671,14 +672,14 @@ RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
     (void)Refine(rates_, 0.0, &states_.V_WB);
     EvaluateHere();
     const Refinement velocity = Refine(rates_, 0.0, &states_.V_WB);
-    if (!velocity.began_settled) EvaluateHere();
-    PutAtEnd(command.acceleration, rows_.size() - joint_rows_, &rates_);
-    rates_ -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
     // What is left of biases that cancel is round-off of their terms, which are products of rates.
     double speed = 0.0;
     for (const Vec6& V : states_.V_WB) {
       speed = std::max({speed, V.head<3>().norm(), V.tail<3>().norm() / length_});
     }
+    if (velocity.change > kRatesSettled * speed) EvaluateHere();
+    PutAtEnd(command.acceleration, rows_.size() - joint_rows_, &rates_);
+    rates_ -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
     const Refinement acceleration = Refine(rates_, kBiasRounding * speed * speed, &states_.A_WB);
     if (velocity.accurate && acceleration.accurate) return RunSummary::Done();
   }

@@ -92,9 +92,11 @@ class ClosureSolver {
   /// lengths].
   double Miss(const VecX& rates, const std::vector<Vec6>& per_body);
   /// Adds the motions that the factors give to what is missing.
-  void AddMissing(std::vector<Vec6>* per_body);
+  /// The size of the change.
+  double AddMissing(std::vector<Vec6>* per_body);
   struct Refinement {
-    bool began_settled = false, accurate = false;
+    double change = 0.0;  ///< the sum of all [rad/s, characteristic lengths per s]
+    bool accurate = false;
   };
   /// Solves the selected rows for the bodies' motions, from those at hand. Misses of `round_off`
   /// [1/s of angles, characteristic lengths per s, or these per s] are none.
