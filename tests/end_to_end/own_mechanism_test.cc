@@ -62,6 +62,46 @@ TEST_F(OwnMechanism, ReferenceAndSimulationAgreeInBothModes) {
   }
 }
 
+// What acts along one coordinate of a universal joint has no power about its other axis, also where
+// that is inclined: then it is not a moment about its own axis.
+TEST_F(OwnMechanism, ReactionsOfUniversalJointsWithInclinedAxesAgree) {
+  const std::string drive = "joint: U, coordinate: ";
+  const std::map<std::string, std::string> models = {
+      {"driven", "drives: {a: {kind: joint, " + drive + "0}, b: {kind: joint, " + drive + "1}}\n"},
+      {"sprung", "drives: {a: {kind: joint, " + drive + "0}, b: {kind: joint, " + drive + "1}}\n" +
+                     "elements:\n  s: {kind: spring, " + drive + "1, stiffness: 4}\n" +
+                     "  r: {kind: friction, " + drive + "0, coulomb: 2}\n"},
+      {"geared", "drives: {a: {kind: joint, " + drive +
+                     "0}}\ncouplings: {g: {joint: U, coordinate: " +
+                     "1, follows: U, follows_coordinate: 0, ratio: 0.7}}\n"},
+      {"reversed",
+       "drives: {a: {kind: joint, " + drive + "0}, b: {kind: joint, " + drive + "1}}\n"}};
+  for (const auto& [name, acting] : models) {
+    const bool reversed = name == "reversed";
+    std::ofstream(mbverify.folder() / (name + ".yaml"))
+        << "name: " << name << "\nbodies: {link: {mass: 1, com: [0.1, 0.05, 0.2], inertia: [0.02, "
+        << "0.03, 0.01]}}\njoints: {U: {kind: universal, "
+        << (reversed ? "parent: link, child: world" : "parent: world, child: link")
+        << ", axis: y, axis2: [1, 0.4, 0.2]}}\noutputs: {link: link}\n"
+        << acting;
+    const bool two = acting.find("b: {kind") != std::string::npos;
+    std::ofstream(mbverify.folder() / "turn.yaml")
+        << "mechanism: ./" << name << ".yaml\nanalytic: none\nsnapshots: {times_s: []}\nmotion:\n"
+        << "  duration_s: 1\n  commands:\n    a: {poly345: {duration_s: 1, delta_deg: 60}}\n"
+        << (two ? "    b: {poly345: {duration_s: 1, delta_deg: 40}}\n" : "");
+    for (const char* mode : {"forward", "inverse"}) {
+      const ProgramResult result = mbverify("run " + (mbverify.folder() / "turn.yaml").string() +
+                                            " --out " + mbverify.Out() + " --mode " + mode);
+      EXPECT_EQ(result.exit_code, 0) << name << ", " << mode << '\n' << result.out << result.err;
+      const std::string path = mbverify.Out() + "/" + name + "/turn/summary.json";
+      EXPECT_TRUE(
+          nlohmann::json::parse(ReadAll(path))["metrics"]["simulated_vs_reference"].contains(
+              "reaction_nrmse_own"))
+          << name;
+    }
+  }
+}
+
 TEST_F(OwnMechanism, AWrongMassOnOneSideIsSeenButNotAttributed) {
   const ProgramResult result = Run("--mode inverse --set simulation.parameters.crank=0.2002");
   EXPECT_EQ(result.exit_code, 1) << result.out;

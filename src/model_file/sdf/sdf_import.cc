@@ -338,11 +338,7 @@ class SdfImporter {
         continue;
       }
       if (!MakeKind(from, what, &joint)) continue;
-      if (joint.kind == JointKind::kUniversal && std::abs(joint.axis.dot(joint.axis2)) > 1e-9) {
-        StoreInSeries(of, from, joint, X_WJ);
-      } else {
-        Store(of, from, joint);
-      }
+      Store(of, from, joint);
     }
   }
 
@@ -455,36 +451,6 @@ class SdfImporter {
     }
     index_[of.scope + from.Name()] = index;
     m_.joints.push_back(std::move(joint));
-  }
-
-  // Two hinges whose axes are not perpendicular, with a massless piece between them.
-  void StoreInSeries(const Waiting& of, const sdf::Joint& from, const Joint& both,
-                     const Pose& X_WJ) {
-    const int piece = static_cast<int>(m_.bodies.size());
-    m_.bodies.push_back({.name = both.name + "_piece", .frames = {}, .shapes = {}});
-    X_WB_.push_back(X_WJ);
-    const std::string what = "joint " + of.scope + from.Name();
-    for (unsigned k = 0; k < 2; ++k) {
-      Joint joint = both;
-      joint.name = fmt::format("{}_{}", both.name, k + 1);
-      joint.kind = JointKind::kRevolute;
-      if (k == 0) {
-        joint.child = piece;
-        joint.X_CM = Pose::Identity();
-      } else {
-        joint.parent = piece;
-        joint.X_PF = Pose::Identity();
-        joint.axis = both.axis2;
-      }
-      const int index = static_cast<int>(m_.joints.size());
-      const sdf::JointAxis& axis = *from.Axis(k);
-      ReadLimits(axis, 0, what, &joint);
-      if (joint.kind != JointKind::kFixed) {
-        AddElements(axis, index, 0, joint);
-        scalars_.push_back({index, 0, from.Name(), axis.Effort()});
-      }
-      m_.joints.push_back(std::move(joint));
-    }
   }
 
   // s = lead · θ/2π. Gazebo's thread_pitch counts radians per metre, with the other sign.

@@ -289,6 +289,14 @@ void Recorder::FindReactionPlaces() {
     ++row;
   }
   for (const Prescribed& base : mechanism.prescribed) add(base.joint, row++);
+  universal_.assign(mechanism.joints.size(), {-1, -1});
+  for (size_t j = 0; j < places_.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
+    if (joint.kind != JointKind::kUniversal) continue;
+    for (const int i : {0, 1}) {
+      universal_[j][i] = IdOf(*engine_.m, mjOBJ_JOINT, mjcf::JointName(joint, i));
+    }
+  }
   elements_of_.resize(mechanism.joints.size());
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     const int joint = mechanism.elements[e].joint;
@@ -470,8 +478,14 @@ double Recorder::ElementForce(size_t e) const {
 // Drives, couplings and force elements act along or about the joint's own axes, through M's origin.
 void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
   const auto exclude = [&](int id, double force) {
-    const ConstVec3 axis(system_->data()->xaxis + 3 * id);
+    Vec3 axis = ConstVec3(system_->data()->xaxis + 3 * id);
     const bool slide = engine_.m->jnt_type[id] == mjJNT_SLIDE;
+    if (const std::array<int, 2>& ids = universal_[joint]; ids[0] >= 0) {
+      // Its moment has no power about the other axis, to which it may be inclined.
+      const ConstVec3 other(system_->data()->xaxis + 3 * (ids[0] == id ? ids[1] : ids[0]));
+      const double c = axis.dot(other);
+      axis = (axis - c * other) / (1.0 - c * c);
+    }
     F_W->segment<3>(slide ? 3 : 0) -= sign * force * axis;
   };
   for (const auto& [row, id] : driven_of_[joint]) exclude(id, system_->DrivenForce(row));

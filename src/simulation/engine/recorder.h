@@ -135,6 +135,7 @@ class Recorder {
       driven_of_,                                 // per joint: (driven row, MuJoCo joint)
       coupled_of_;                                // per joint: (constraint row, MuJoCo joint)
   std::vector<std::vector<size_t>> elements_of_;  // per joint: force elements
+  std::vector<std::array<int, 2>> universal_;     // per joint: MuJoCo's hinges of a universal one
   Eigen::Matrix<double, 6, Eigen::Dynamic> W_;  // per MuJoCo body: wrench from its parent about the
                                                 // root's centre of mass, world axes
   VecX work_;
