@@ -13,6 +13,7 @@
 #include "kinematics/home.h"
 #include "math/spatial.h"
 #include "mechanism/reach.h"
+#include "reference/force_solver.h"
 #include "reference/row_set.h"
 #include "reference/square_system.h"
 
@@ -50,6 +51,22 @@ std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motio
   return commands;
 }
 
+// Are the commands all drives, then all prescribed joints, each alone?
+bool AreDriven(const Mechanism& mechanism, const std::vector<Command>& commands) {
+  const size_t drives = mechanism.drives.size();
+  if (commands.size() != drives + mechanism.prescribed.size()) return false;
+  for (size_t k = 0; k < commands.size(); ++k) {
+    if (commands[k].terms.size() != 1 || commands[k].terms.front().factor != 1.0) return false;
+    const Coordinate& coordinate = commands[k].terms.front().coordinate;
+    const bool drive = k < drives;
+    if (coordinate.kind != (drive ? Coordinate::Kind::kDrive : Coordinate::Kind::kPrescribed) ||
+        coordinate.index != static_cast<int>(drive ? k : k - drives)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // A value of the coordinate at home that says which turn an angle is in.
 double HomeTurn(const Mechanism& mechanism, const Coordinate& coordinate, double commanded) {
   return coordinate.kind == Coordinate::Kind::kOutput ? commanded
@@ -85,6 +102,7 @@ ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
       commands_(AllCommands(mechanism, motion)),
       spins_(IdleSpins(mechanism)),
       followed_(FollowedAngles(mechanism, motion)),
+      commands_are_driven_(AreDriven(mechanism, commands_)),
       system_(mechanism.bodies.size(), length_),
       predictor_(length_) {
   MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
@@ -137,8 +155,26 @@ double ClosureSolver::Openness(const VecX& residual, const VecX& target,
   return openness;
 }
 
-RunSummary ClosureSolver::SelectRows() {
-  selection_ = system_.IndependentRows(rows_, 0, joint_rows_);
+void ClosureSolver::FindTransmitting() {
+  int row = 0;
+  const auto take = [&](int count) {
+    for (int i = 0; i < count; ++i) transmitting_.push_back(row + i);
+  };
+  for (const Joint& joint : mechanism_.joints) {
+    take(ReactionRows(joint));
+    row += 6 - DofsOf(joint.kind);
+  }
+  take(joint_rows_ - first_coupling_);
+}
+
+RunSummary ClosureSolver::SelectRows(bool of_forces) {
+  // What transmits forces may hold what all joints do: then forces have the same factors.
+  if (of_forces) selection_ = system_.IndependentRows(rows_, transmitting_);
+  if (!of_forces || selection_.size() + free_rows() < static_cast<size_t>(system_.size())) {
+    std::vector<int> all(static_cast<size_t>(joint_rows_));
+    std::iota(all.begin(), all.end(), 0);
+    selection_ = system_.IndependentRows(rows_, all);
+  }
   selection_is_new_ = true;
   orientation_ = 0;
   const int dofs = system_.size() - static_cast<int>(selection_.size() + spins_.size());
@@ -158,7 +194,7 @@ bool ClosureSolver::SelectAnew() {
   EvaluateHere();
   const std::vector<int> before = std::exchange(selection_, {});
   const int orientation = orientation_;
-  if (SelectRows().ok() && selection_ != before && system_.Factor(rows_, selection_, true) &&
+  if (SelectRows(false).ok() && selection_ != before && system_.Factor(rows_, selection_, true) &&
       system_.SmallestSingularValue(1) > kRegular) {
     selection_is_new_ = false;
     orientation_ = system_.determinant_sign();
@@ -182,9 +218,10 @@ RunSummary ClosureSolver::Prepare() {
   }
   Trial home{states_, near_values_};
   EvaluateRows(&home);
+  FindTransmitting();
   near_values_ = home.near_values;
   target_ = Eigen::Map<const VecX>(rows_.value.data() + joint_rows_, rows_.size() - joint_rows_);
-  return SelectRows();
+  return SelectRows(true);
 }
 
 ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, Trial* trial) {

@@ -33,8 +33,20 @@ class ClosureSolver {
   [[nodiscard]] RunSummary Solve(const CommandSample& command);
 
   [[nodiscard]] const BodyStates& states() const { return states_; }
-  /// Of all joints, then couplings, at the pose of states(); behind them others.
+  /// Of all joints, couplings, commands and idle spins at the pose of states().
   [[nodiscard]] const RowSet& rows() const { return rows_; }
+  /// Those of joints and couplings that transmit forces.
+  [[nodiscard]] const std::vector<int>& transmitting() const { return transmitting_; }
+  /// Rows that are as many as the unknowns.
+  [[nodiscard]] const std::vector<int>& selection() const { return selection_; }
+  /// They are all that transmit forces and those of all drives, all prescribed joints and idle
+  /// spins, in this order.
+  [[nodiscard]] bool selection_is_of_forces() const {
+    return commands_are_driven_ && selection_.size() == transmitting_.size() + free_rows() &&
+           std::equal(transmitting_.begin(), transmitting_.end(), selection_.begin());
+  }
+  /// Factors of the selection at states() or a pose of the way there.
+  [[nodiscard]] SquareSystem& system() { return system_; }
 
   /// Other velocities and accelerations at the pose of states().
   [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
@@ -64,6 +76,7 @@ class ClosureSolver {
   [[nodiscard]] double Rounding(const std::vector<Pose>& X_WB) const {
     return GapRounding(Reach(lever_, X_WB));
   }
+  [[nodiscard]] size_t free_rows() const { return commands_.size() + spins_.size(); }
   [[nodiscard]] Step Newton(const VecX& target, bool limit_step, Trial* trial);
   [[nodiscard]] RunSummary Follow(const VecX& target, int first_steps);
   /// Into how many steps a way is cut first: by the motion that the bodies begin it with,
@@ -73,7 +86,9 @@ class ClosureSolver {
   [[nodiscard]] bool Turned() const {
     return orientation_ != 0 && system_.determinant_sign() != orientation_;
   }
-  [[nodiscard]] RunSummary SelectRows();
+  void FindTransmitting();
+  /// `of_forces`: of rows that transmit forces, where these are enough.
+  [[nodiscard]] RunSummary SelectRows(bool of_forces);
   /// Chooses among redundant rows anew at states(), where those chosen before may have become
   /// dependent although the mechanism is regular there. False if it is not.
   [[nodiscard]] bool SelectAnew();
@@ -91,8 +106,7 @@ class ClosureSolver {
   /// What the selected rows miss of the rates, into missing_; the largest [rad, characteristic
   /// lengths].
   double Miss(const VecX& rates, const std::vector<Vec6>& per_body);
-  /// Adds the motions that the factors give to what is missing.
-  /// The size of the change.
+  /// Adds the motions that the factors give to what is missing; returns their size.
   double AddMissing(std::vector<Vec6>* per_body);
   struct Refinement {
     double change = 0.0;  ///< the sum of all [rad/s, characteristic lengths per s]
@@ -112,11 +126,12 @@ class ClosureSolver {
   std::vector<Command> commands_;  ///< of the motion, then prescribed joints held at home
   const std::vector<Spin> spins_;  ///< idle
   const std::vector<FollowedAngle> followed_;
+  const bool commands_are_driven_;
   SquareSystem system_;
   RowSet rows_;  ///< all joint rows and couplings, then the command rows, then idle spins
   int first_coupling_ = 0, joint_rows_ = 0;
   std::vector<double> coupled_size_;  ///< per coupling: its largest piece, for rounding
-  std::vector<int> selection_;
+  std::vector<int> transmitting_, selection_;
   bool selection_is_new_ = true;
   bool rows_are_here_ = false;  ///< rows_ are those of states_, but for biases
   int orientation_ = 0;         ///< sign of the determinant on this branch

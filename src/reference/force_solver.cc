@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "base/demand.h"
 #include "kinematics/constraints.h"
@@ -59,15 +60,17 @@ namespace {
 constexpr double kBalanceTolerance = 1e-9;
 // A smaller share of the largest that one resting element opens is round-off.
 constexpr double kOpens = 1e-9;
+// Forces are refined while that makes what they leave open smaller by this, and not for ever.
+constexpr double kPassHelps = 0.1;
+constexpr int kMostRefinements = 8;
 // More self-stresses than this are not looked at one by one.
 constexpr size_t kFewSelfStresses = 24;
 
-// Forces only: of joints that lock all translations.
+}  // namespace
+
 int ReactionRows(const Joint& joint) {
   return joint.transmits_force_only ? 3 : 6 - DofsOf(joint.kind);
 }
-
-}  // namespace
 
 void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* out) {
   for (const Joint& joint : mechanism.joints) {
@@ -83,17 +86,16 @@ ForceSolver::ForceSolver(const Mechanism& mechanism, double duration_s)
       lever_(LongestLever(mechanism)),
       duration_s_(duration_s),
       system_(mechanism.bodies.size(), length_),
-      spins_(IdleSpins(mechanism)),
-      closed_by_reactions_(std::ranges::none_of(mechanism.joints, &Joint::transmits_force_only)) {}
+      spins_(IdleSpins(mechanism)) {}
 
-void ForceSolver::FillRows(const BodyStates& states, const RowSet* closed) {
-  if (closed != nullptr && closed_by_reactions_ && chosen_) {
-    rows_.Take(*closed, first_driven_);
+void ForceSolver::FillRows(const BodyStates& states, const ClosureSolver* closure) {
+  if (closure != nullptr) {
+    rows_.Take(closure->rows(), closure->transmitting());
   } else {
     rows_.Clear();
     AddReactionRows(mechanism_, states, &rows_);
-    first_driven_ = rows_.size();
   }
+  first_driven_ = rows_.size();
   for (const Drive& drive : mechanism_.drives) {
     rows_.Add(DriveRow(mechanism_, drive, states), PositionUnit(mechanism_, drive) == "rad");
   }
@@ -104,8 +106,26 @@ void ForceSolver::FillRows(const BodyStates& states, const RowSet* closed) {
   for (const Spin& spin : spins_) rows_.Add(IdleRow(spin, states), true);
 }
 
+// The moments of drives and the motions that they command have the same rows.
+bool ForceSolver::Share(ClosureSolver* closure) {
+  used_ = &system_;
+  if (closure == nullptr || !closure->selection_is_of_forces()) return false;
+  rows_.Take(closure->rows(), closure->selection());
+  first_driven_ = static_cast<int>(closure->transmitting().size());
+  basis_.resize(closure->selection().size());
+  std::iota(basis_.begin(), basis_.end(), 0);
+  rest_.clear();
+  self_stress_.resize(rows_.size(), 0);
+  sparse_ = chosen_ = false;
+  used_ = &closure->system();
+  return true;
+}
+
 RunSummary ForceSolver::SelectBasis() {
-  basis_ = system_.IndependentRows(rows_, 0, rows_.size());
+  used_ = &system_;
+  std::vector<int> all(static_cast<size_t>(rows_.size()));
+  std::iota(all.begin(), all.end(), 0);
+  basis_ = system_.IndependentRows(rows_, all);
   if (static_cast<int>(basis_.size()) < system_.size()) {
     RunSummary summary;
     summary.stop = Stop::kSingular;
@@ -195,37 +215,54 @@ RunSummary ForceSolver::CheckControl(const BodyStates& states) {
   return summary;
 }
 
+double ForceSolver::Largest(const VecX& wrenches) const {
+  if (system_.size() == 0) return 0.0;
+  return system_.body_scale().cwiseProduct(wrenches).cwiseAbs().maxCoeff();
+}
+
 double ForceSolver::Missing(const VecX& force, const VecX& wrenches, VecX* residual) const {
   std::vector<Vec6> have(mechanism_.bodies.size(), Vec6::Zero());
   rows_.AddWrenches(force, &have);
   *residual = wrenches - Stack(have);
-  return system_.body_scale().cwiseProduct(*residual).cwiseAbs().maxCoeff();
+  return Largest(*residual);
 }
 
-VecX ForceSolver::LeastNorm(const VecX& wrenches) {
+VecX ForceSolver::LeastNorm(const VecX& wrenches, double* left) {
   VecX scale(rows_.size());
   for (int i = 0; i < rows_.size(); ++i) scale[i] = system_.RowScale(rows_.angular[i]);
   if (sparse_) {
-    return scale.cwiseProduct(least_.LeastNorm(system_.body_scale().cwiseProduct(wrenches)));
+    const VecX force =
+        scale.cwiseProduct(least_.LeastNorm(system_.body_scale().cwiseProduct(wrenches)));
+    VecX missing;
+    *left = Missing(force, wrenches, &missing);
+    return force;
   }
   VecX force = VecX::Zero(rows_.size());
   VecX missing = wrenches;
-  // The second pass is iterative refinement.
-  for (int pass = 0; pass < 2; ++pass) {
-    const VecX part = system_.Solve(missing);
+  // Iterative refinement, which also brings factors of a pose nearby to this one.
+  const double round_off = 2 * kEps * Largest(wrenches);
+  for (int pass = 0; pass < kMostRefinements; ++pass) {
+    const VecX part = used_->Solve(missing);
     for (int b = 0; b < system_.size(); ++b) force[basis_[b]] += part[b];
-    (void)Missing(force, wrenches, &missing);
+    const double now = Missing(force, wrenches, &missing);
+    const double before = std::exchange(*left, now);
+    if (pass > 0 && !(now > round_off && now < kPassHelps * before)) break;
   }
   if (rest_.empty()) return force;
   VecX scaled = force.cwiseQuotient(scale);
   TakeLeastForces(self_stress_, first_driven_, &scaled);
-  return scale.cwiseProduct(scaled);
+  force = scale.cwiseProduct(scaled);
+  *left = Missing(force, wrenches, &missing);
+  return force;
 }
 
 RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample,
-                              const RowSet* closed) {
-  if (!chosen_) SelectAtHome();
-  FillRows(sample->states, closed);
+                              ClosureSolver* closure) {
+  const bool shared = Share(closure);
+  if (!shared) {
+    if (!chosen_) SelectAtHome();
+    FillRows(sample->states, closure);
+  }
   std::vector<Vec6> required;
   sample->friction_signs = FrictionDirections(mechanism_, sample->states, duration_s_);
   RequiredWrenches(mechanism_, sample->states, loads, sample->friction_signs, &required);
@@ -239,31 +276,30 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
     return summary;
   }
   const VecX wrenches = Stack(required);
-  const double largest =
-      system_.size() == 0 ? 0.0 : system_.body_scale().cwiseProduct(wrenches).cwiseAbs().maxCoeff();
+  const double largest = Largest(wrenches);
 
   // A basis chosen earlier may have become bad; choose again once.
-  VecX residual;
   RunSummary control = RunSummary::Done();
-  for (int attempt = chosen_ ? 0 : 1; attempt < 2; ++attempt) {
+  for (int attempt = shared || chosen_ ? 0 : 1; attempt < 2; ++attempt) {
+    const bool factored = shared && attempt == 0;  // and looked at: by the loop closure
     if (attempt == 1) {
       if (RunSummary summary = SelectBasis(); !summary.ok()) {
         return control.ok() ? summary : control;
       }
     }
-    if (!Factor()) continue;
-    control = CheckControl(sample->states);
+    if (!factored && !Factor()) continue;
+    if (!factored) control = CheckControl(sample->states);
     if (!control.ok()) {
       // Of redundant rows the basis may have become dependent, not the mechanism.
       if (attempt == 0 && !rest_.empty()) continue;
       return control;
     }
-    VecX force = LeastNorm(wrenches);
-    if (!(Missing(force, wrenches, &residual) <= kBalanceTolerance * largest)) continue;
+    double left = kNan;
+    VecX force = LeastNorm(wrenches, &left);
+    if (!(left <= kBalanceTolerance * largest)) continue;
     if (RunSummary summary = AddLoadFriction(sample, &force); !summary.ok()) return summary;
     Report(force, sample);
     FindBands(sample);
-    AuditSample(mechanism_, loads, sample);
     return RunSummary::Done();
   }
   RunSummary summary;
@@ -340,10 +376,11 @@ RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample, VecX* force) {
   LoadSystem system;
   MatX unit(force->size(), static_cast<Eigen::Index>(loaded.size()));  // forces per unit of each
   const MatX reactions = ReactionsOf(*force, sample->states);
+  double left = kNan;
   for (size_t d = 0; d < loaded.size(); ++d) {
     const size_t e = loaded[d];
     unit.col(static_cast<Eigen::Index>(d)) =
-        -LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()));
+        -LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()), &left);
     system.p.push_back(AcrossAxis(mechanism_, e, reactions));
     system.sign.push_back(sample->friction_signs[e]);
     system.per_load.push_back(std::get<FrictionLaw>(mechanism_.elements[e].law).per_load());
@@ -380,9 +417,10 @@ void ForceSolver::FindBands(ReferenceSample* sample) {
   const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
   const auto bases = static_cast<Eigen::Index>(mechanism_.prescribed.size());
   VecX band = VecX::Zero(drives + bases);
+  double left = kNan;
   for (const VecX& wrenches :
        RestingWrenches(mechanism_, sample->states, sample->friction_signs, sample->load_friction)) {
-    VecX part = LeastNorm(wrenches).segment(first_driven_, drives + bases).cwiseAbs();
+    VecX part = LeastNorm(wrenches, &left).segment(first_driven_, drives + bases).cwiseAbs();
     TakeRoundoff(&part);
     band += part;
   }

@@ -18,6 +18,8 @@
 
 namespace mbv::internal {
 
+class ClosureSolver;
+
 /// Where statics leaves a choice, one set of forces is taken: first the norm of the driven forces
 /// (drives and prescribed joints) is made least, then that of all forces. `self_stress` (forces ×
 /// k) spans the forces that balance each other; `first_driven` and all later rows are driven.
@@ -34,23 +36,28 @@ class ForceSolver {
   /// `duration_s`: of the motion; it says what is at rest.
   ForceSolver(const Mechanism& mechanism, double duration_s);
 
-  /// Fills forces, bands, reactions and the power audit of `sample` from its states and driven
-  /// motion. Where the equations leave a choice, TakeLeastForces() decides. Friction at rest is
-  /// zero in forces and reactions; a band is Σ |∂(drive force)/∂(friction)| Fs over what rests, Fs
-  /// by the load of the middle. `closed`: rows of all joints and couplings at these states, where
-  /// the loop closure has them at hand.
+  /// Fills forces, bands and reactions of `sample` from its states and driven motion. Where the
+  /// equations leave a choice, TakeLeastForces() decides. Friction at rest is zero in forces and
+  /// reactions; a band is Σ |∂(drive force)/∂(friction)| Fs over what rests, Fs by the load of the
+  /// middle. `closure`: solved for these states; its rows and factors are taken where they are
+  /// those of the forces.
   [[nodiscard]] RunSummary Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample,
-                                 const RowSet* closed = nullptr);
+                                 ClosureSolver* closure = nullptr);
 
  private:
-  void FillRows(const BodyStates& states, const RowSet* closed);
+  void FillRows(const BodyStates& states, const ClosureSolver* closure);
+  /// Takes the closure's rows and factors. False where the forces have others.
+  [[nodiscard]] bool Share(ClosureSolver* closure);
   void SelectAtHome();
   [[nodiscard]] RunSummary SelectBasis();
   [[nodiscard]] bool Factor();
   [[nodiscard]] bool FactorSparse();
   void FindSelfStress();
   [[nodiscard]] RunSummary CheckControl(const BodyStates& states);
-  [[nodiscard]] VecX LeastNorm(const VecX& wrenches);
+  /// `left`: Missing() of the result.
+  [[nodiscard]] VecX LeastNorm(const VecX& wrenches, double* left);
+  /// The largest force, moments divided by the characteristic length.
+  [[nodiscard]] double Largest(const VecX& wrenches) const;
   [[nodiscard]] double Missing(const VecX& force, const VecX& wrenches, VecX* residual) const;
   void Report(const VecX& force, ReferenceSample* sample) const;
   void FindBands(ReferenceSample* sample);
@@ -63,8 +70,8 @@ class ForceSolver {
   const Mechanism& mechanism_;
   const double length_, lever_, duration_s_;
   SquareSystem system_;
-  const std::vector<Spin> spins_;   ///< idle
-  const bool closed_by_reactions_;  ///< all that a joint locks it can transmit
+  SquareSystem* used_ = &system_;  ///< or the closure's
+  const std::vector<Spin> spins_;  ///< idle
   RowSet rows_;  ///< AddReactionRows(), drives, prescribed joints, idle spins: these are given none
   int first_driven_ = 0;  ///< row of the first drive
   std::vector<int> basis_, rest_;
@@ -76,6 +83,8 @@ class ForceSolver {
   bool sparse_ = false;
 };
 
+/// Rows of a joint that transmit forces, its first ones: of one that transmits a force only, three.
+[[nodiscard]] int ReactionRows(const Joint& joint);
 /// Rows of all joints, with the isostatic rule applied, then of all couplings: what they can
 /// transmit.
 void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* rows);

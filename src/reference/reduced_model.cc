@@ -52,6 +52,7 @@ struct ReducedModel::Impl {
   std::optional<internal::SampleRecorder> recorder;
   CommandSample command;
   ReferenceSample sample;
+  bool driven_known = true;  ///< in `sample`: not all callers ask
 };
 
 ReducedModel::ReducedModel(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates)
@@ -87,12 +88,18 @@ RunSummary ReducedModel::Move(const VecX& q, const VecX& v, const VecX& a) {
     return summary;
   }
   impl_->sample.states = impl_->closure->states();
-  impl_->recorder->Record(&impl_->sample);
+  impl_->recorder->RecordOutputs(&impl_->sample);
+  impl_->driven_known = false;
   return summary;
 }
 
 const BodyStates& ReducedModel::states() const { return impl_->sample.states; }
-const ReferenceSample& ReducedModel::sample() const { return impl_->sample; }
+const ReferenceSample& ReducedModel::sample() const {
+  if (!impl_->driven_known) impl_->recorder->RecordDriven(&impl_->sample);
+  impl_->driven_known = true;
+  return impl_->sample;
+}
+const VecX& ReducedModel::drive_force() const { return impl_->sample.drive_force; }
 
 RunSummary ReducedModel::Motions(MatX* T) {
   return impl_->closure->UnitMotions(static_cast<int>(size()), T);
@@ -191,7 +198,7 @@ MatX ReducedModel::DriveRates(const MatX& T) const {
 }
 
 RunSummary ReducedModel::AllForces(const std::vector<LoadSample>& loads) {
-  return impl_->forces->Solve(loads, &impl_->sample, &impl_->closure->rows());
+  return impl_->forces->Solve(loads, &impl_->sample, &*impl_->closure);
 }
 
 }  // namespace mbv

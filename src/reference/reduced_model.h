@@ -49,6 +49,8 @@ class ReducedModel {
   [[nodiscard]] const BodyStates& states() const;
   /// Drives and prescribed joints, outputs: what ReferenceSample names so.
   [[nodiscard]] const ReferenceSample& sample() const;
+  /// Of AllForces(), as sample() has them.
+  [[nodiscard]] const VecX& drive_force() const;
   /// T of (1): 6·(bodies − 1) × n, [ω; v of Bo] of each moving body in world axes.
   [[nodiscard]] RunSummary Motions(MatX* T);
   /// H of (2): 6·(bodies − 1) × n·n, column i n + j; H_ij = H_ji.

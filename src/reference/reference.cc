@@ -11,8 +11,9 @@ namespace mbv {
 
 struct ReferenceSolver::Impl {
   Impl(const Mechanism& m, const Motion& motion, const ReferenceOptions& options)
-      : closure(m, motion, options), forces(m, motion.duration_s), recorder(m) {}
+      : mechanism(m), closure(m, motion, options), forces(m, motion.duration_s), recorder(m) {}
 
+  const Mechanism& mechanism;
   internal::ClosureSolver closure;
   internal::ForceSolver forces;
   internal::SampleRecorder recorder;
@@ -35,8 +36,12 @@ RunSummary ReferenceSolver::Kinematics(const CommandSample& command, ReferenceSa
 
 RunSummary ReferenceSolver::Dynamics(const CommandSample& command, ReferenceSample* sample) {
   if (RunSummary summary = Kinematics(command, sample); !summary.ok()) return summary;
-  RunSummary summary = impl_->forces.Solve(command.loads, sample, &impl_->closure.rows());
-  if (!summary.ok()) summary.time_s = command.time_s;
+  RunSummary summary = impl_->forces.Solve(command.loads, sample, &impl_->closure);
+  if (!summary.ok()) {
+    summary.time_s = command.time_s;
+    return summary;
+  }
+  internal::AuditSample(impl_->mechanism, command.loads, sample);
   return summary;
 }
 

@@ -14,14 +14,15 @@ void RowSet::Clear() {
   angular.clear();
 }
 
-void RowSet::Take(const RowSet& other, int count) {
-  const int pieces = other.start[static_cast<size_t>(count)];
-  start.assign(other.start.begin(), other.start.begin() + count + 1);
-  body.assign(other.body.begin(), other.body.begin() + pieces);
-  J.assign(other.J.begin(), other.J.begin() + pieces);
-  value.assign(other.value.begin(), other.value.begin() + count);
-  bias.assign(other.bias.begin(), other.bias.begin() + count);
-  angular.assign(other.angular.begin(), other.angular.begin() + count);
+void RowSet::Take(const RowSet& other, const std::vector<int>& rows) {
+  Clear();
+  for (const int i : rows) {
+    const auto row = static_cast<size_t>(i);
+    const int first = other.start[row], last = other.start[row + 1];
+    body.insert(body.end(), other.body.begin() + first, other.body.begin() + last);
+    J.insert(J.end(), other.J.begin() + first, other.J.begin() + last);
+    CloseRow(other.value[row], other.bias[row], other.angular[row] != 0);
+  }
 }
 
 void RowSet::AddPiece(int body_index, const Vec6& J_piece) {

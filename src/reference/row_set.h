@@ -21,8 +21,8 @@ struct RowSet {
 
   [[nodiscard]] int size() const { return static_cast<int>(value.size()); }
   void Clear();
-  /// Becomes the first `count` rows of another set.
-  void Take(const RowSet& other, int count);
+  /// Becomes these rows of another set.
+  void Take(const RowSet& other, const std::vector<int>& rows);
   /// The first `count` rows of a joint.
   void Add(const ConstraintRows& rows, int count);
   void Add(const CouplingRow& row);

@@ -20,11 +20,11 @@ class SampleRecorder {
 
   /// Fills `driven` and `outputs` of a sample from its states.
   void Record(ReferenceSample* sample);
-
- private:
   void RecordDriven(ReferenceSample* sample);
+  /// Their angles are followed from one call to the next.
   void RecordOutputs(ReferenceSample* sample);
 
+ private:
   const Mechanism& mechanism_;
   MatX last_outputs_;
 };

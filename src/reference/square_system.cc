@@ -24,18 +24,20 @@ SquareSystem::SquareSystem(size_t bodies, double length)
   for (int i = 0; i < size_; i += 6) body_scale_.segment<3>(i).setConstant(1.0 / length_);
 }
 
-SparseLu::Matrix SquareSystem::ScaledColumns(const RowSet& rows, int first, int last) const {
+SparseLu::Matrix SquareSystem::ScaledColumns(const RowSet& rows,
+                                             const std::vector<int>& among) const {
   std::vector<Eigen::Triplet<double>> entries;
-  for (int i = first; i < last; ++i) {
+  for (int k = 0; k < static_cast<int>(among.size()); ++k) {
+    const int i = among[k];
     for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
       const int at = 6 * (rows.body[p] - 1);
       for (int c = 0; c < 6; ++c) {
         const double x = RowScale(rows.angular[i]) * body_scale_[at + c] * rows.J[p][c];
-        if (x != 0.0) entries.emplace_back(at + c, i - first, x);
+        if (x != 0.0) entries.emplace_back(at + c, k, x);
       }
     }
   }
-  SparseLu::Matrix columns(size_, last - first);
+  SparseLu::Matrix columns(size_, static_cast<Eigen::Index>(among.size()));
   columns.setFromTriplets(entries.begin(), entries.end());
   return columns;
 }
@@ -68,7 +70,8 @@ bool IsSame(const SparseLu::Matrix& A, const SparseLu::Matrix& B) {
 
 }  // namespace
 
-std::vector<int> SquareSystem::IndependentRows(const RowSet& rows, int first, int last) const {
+std::vector<int> SquareSystem::IndependentRows(const RowSet& rows,
+                                               const std::vector<int>& among) const {
   // Each pose of a study begins at the same home: what was asked last is remembered, of loop
   // closure and of forces.
   struct Answer {
@@ -77,7 +80,7 @@ std::vector<int> SquareSystem::IndependentRows(const RowSet& rows, int first, in
   };
   thread_local std::array<Answer, 2> answers;
   thread_local size_t next = 0;
-  SparseLu::Matrix columns = ScaledColumns(rows, first, last);
+  SparseLu::Matrix columns = ScaledColumns(rows, among);
   if (columns.size() == 0) return {};
   const auto known = std::ranges::find_if(
       answers, [&](const Answer& answer) { return IsSame(answer.columns, columns); });
@@ -87,7 +90,7 @@ std::vector<int> SquareSystem::IndependentRows(const RowSet& rows, int first, in
     answer.columns = std::move(columns);
   }
   std::vector<int> chosen = answer.chosen;
-  for (int& row : chosen) row += first;
+  for (int& row : chosen) row = among[static_cast<size_t>(row)];
   return chosen;
 }
 void SquareSystem::MakeColumns(const RowSet& rows, const std::vector<int>& selection,

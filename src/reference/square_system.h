@@ -23,10 +23,11 @@ class SquareSystem {
 
   [[nodiscard]] int size() const { return size_; }
 
-  /// Chooses rows independent of each other among the `rows` with first <= index < last, by QR
-  /// with column pivoting, of many bodies by sparse QR where that is clear; increasing. Fewer
-  /// than size() if their rank is less.
-  [[nodiscard]] std::vector<int> IndependentRows(const RowSet& rows, int first, int last) const;
+  /// Chooses rows independent of each other `among` some, which increase, by QR with column
+  /// pivoting, of many bodies by sparse QR where that is clear; increasing. Fewer than size() if
+  /// their rank is less.
+  [[nodiscard]] std::vector<int> IndependentRows(const RowSet& rows,
+                                                 const std::vector<int>& among) const;
 
   /// Factors the matrix of the rows `selection` (size() of them, always the same ones unless
   /// `new_selection`). False if it is exactly singular.
@@ -59,7 +60,8 @@ class SquareSystem {
   [[nodiscard]] const VecX& body_scale() const { return body_scale_; }
 
  private:
-  [[nodiscard]] SparseLu::Matrix ScaledColumns(const RowSet& rows, int first, int last) const;
+  [[nodiscard]] SparseLu::Matrix ScaledColumns(const RowSet& rows,
+                                               const std::vector<int>& among) const;
   int size_;
   double length_;
   VecX body_scale_;  ///< 1/L for rotations, 1 for translations

@@ -128,7 +128,9 @@ std::vector<double> StalePoses(const Mechanism& net, double home_deg) {
     rows.Add(DriveRow(net, net.drives[0], sample.states), true);
   };
   fill(home_deg);
-  const std::vector<int> basis = system.IndependentRows(rows, 0, rows.size());
+  std::vector<int> all(static_cast<size_t>(rows.size()));
+  std::iota(all.begin(), all.end(), 0);
+  const std::vector<int> basis = system.IndependentRows(rows, all);
   bool first = true;
   const auto sign_at = [&](double deg) {
     fill(deg);

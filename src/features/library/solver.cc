@@ -557,7 +557,7 @@ BatchStatus Solver::InverseDynamicsRows(const MatX& q, const MatX& v, const MatX
     RunSummary summary =
         reduced->Move(q.row(i).transpose(), v.row(i).transpose(), a.row(i).transpose());
     if (summary.ok()) summary = reduced->AllForces({});
-    if (summary.ok()) drive_forces->row(i) = reduced->sample().drive_force.transpose();
+    if (summary.ok()) drive_forces->row(i) = reduced->drive_force().transpose();
     return StatusOf(summary);
   });
 }
