@@ -19,6 +19,7 @@
 #include "simulation/import/read_mjcf.h"
 #include "simulation/mjcf/foreign_rows.h"
 #include "simulation/mjcf/mjcf.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {
@@ -463,14 +464,194 @@ TEST(ForeignMjcf, ReplicatesAreWrittenOutWithWhatRefersToThem) {
   }
 }
 
-TEST(ForeignMjcf, BodiesOfOtherModelsAreNotLostInSilence) {
-  const Read read = ReadText(Arm({.head = "<asset><model name='hand' file='hand.xml'/></asset>",
-                                  .in_arm = "<attach model='hand' body='palm' prefix='h'/>"}));
-  EXPECT_FALSE(read.model);
-  EXPECT_NE(
-      read.diagnostics.Text().find("<attach> (1: upper) is not read: bodies of another model"),
-      std::string::npos)
-      << read.diagnostics.Text();
+// A hand in degrees, "zyx" and classes of its own, on an arm in radians with others.
+const char* const kHand =
+    R"(<mujoco model="hand"><compiler angle="degree" eulerseq="zyx" meshdir="meshes"/>
+<option gravity="0 0 -5"/>
+<default><geom density="500" contype="0" conaffinity="0"/><joint damping="0.2" range="-90 45"/>
+<default class="finger"><joint damping="0.3" range="-30 60"/><general gear="3"/></default></default>
+<asset><mesh file="tip.obj"/></asset>
+<worldbody><body name="wrist" childclass="finger"><body name="palm" pos="0 0 0.1" euler="30 40 50">
+<joint name="yaw" axis="0 0 1"/><geom type="box" size="0.1 0.2 0.3"/>
+<body name="thumb" pos="0.1 0 0"><joint name="bend" class="main" ref="10"/><geom size="0.1"/><site name="pad" euler="0 90 90"/>
+<geom type="mesh" mesh="tip" mass="0"/></body>
+<body name="slider" pos="0 0 0.2"><joint name="out" type="slide" range="-0.1 0.2"/><geom size="0.1"/></body></body></body></worldbody>
+<tendon><fixed name="sum"><joint joint="yaw" coef="1"/><joint joint="bend" coef="2"/></fixed></tendon>
+<equality><joint name="gear" joint1="bend" joint2="yaw" polycoef="0 2 0 0 0"/><tendon name="held" tendon1="sum"/>
+<connect name="outside" body1="palm" body2="wrist" anchor="0 0 0"/></equality>
+<actuator><motor name="m" joint="out" class="finger"/></actuator>
+<keyframe><key name="grip" qpos="0.1 0.2 0.15"/></keyframe></mujoco>)";
+
+std::string WithHand(const std::string& attach) {
+  return R"(<mujoco model="arm"><compiler angle="radian"/><default><geom density="7" contype="0" conaffinity="0"/>
+<joint damping="9"/></default><asset><model file="hand.xml"/></asset><worldbody>
+<body name="upper" euler="0.1 0.2 0.3"><joint name="A" axis="0 1 0" range="-1 1"/><geom size="0.1"/>
+<frame pos="0 0 0.4" euler="0.5 0 0">)" +
+         attach + R"(</frame></body></worldbody>
+<actuator><motor name="a" joint="A"/><motor name="t" joint="l_yaw"/></actuator></mujoco>)";
+}
+
+// What is attached is what MuJoCo 3 makes of it, here written by hand.
+TEST(ForeignMjcf, AttachedModelsKeepTheirClassesUnitsAndKeyframes) {
+  const std::string by_hand = R"(<mujoco model="arm"><compiler angle="radian"/><worldbody>
+<body name="upper" euler="0.1 0.2 0.3"><joint name="A" axis="0 1 0" limited="true" range="-1 1" damping="9"/>
+<geom size="0.1" density="7" contype="0" conaffinity="0"/><body name="turned" pos="0 0 0.4" euler="0.5 0 0">
+<body name="first" pos="0 0 0.1" axisangle="0 0 1 0.5235987755982988"><body name="second" axisangle="0 1 0 0.6981317007977318">
+<body name="l_palm" axisangle="1 0 0 0.8726646259971648"><joint name="l_yaw" axis="0 0 1" damping="0.3" limited="true"
+ range="-0.5235987755982988 1.0471975511965976"/><geom type="box" size="0.1 0.2 0.3" density="500" contype="0" conaffinity="0"/>
+<body name="l_thumb" pos="0.1 0 0"><joint name="l_bend" damping="0.2" limited="true" ref="0.17453292519943295"
+ range="-1.5707963267948966 0.7853981633974483"/><geom size="0.1" density="500" contype="0" conaffinity="0"/>
+<body name="padded" axisangle="0 1 0 1.5707963267948966"><site name="l_pad" axisangle="1 0 0 1.5707963267948966"/></body></body>
+<body name="l_slider" pos="0 0 0.2"><joint name="l_out" type="slide" damping="0.3" limited="true" range="-0.1 0.2"/>
+<geom size="0.1" density="500" contype="0" conaffinity="0"/></body></body></body></body></body></body></worldbody></mujoco>)";
+  const test::TestFolder folder("attach");
+  folder.Write("hand.xml", kHand);
+  folder.Write("meshes/tip.obj",
+               "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  const auto read_in = [&](const std::string& text) {
+    Read read;
+    read.model = ReadMjcf(text, folder.Write("arm.xml", text), "", &read.diagnostics);
+    return read;
+  };
+  const Read attached = read_in(WithHand("<attach model='hand' body='palm' prefix='l_'/>"));
+  const Read plain = ReadText(by_hand);
+  const std::string said = attached.diagnostics.Text();
+  ASSERT_TRUE(attached.model) << said;
+  ASSERT_TRUE(plain.model) << plain.diagnostics.Text();
+  const Mechanism &m = attached.model->mechanism, &n = plain.model->mechanism;
+  for (const char* name : {"upper", "l_palm", "l_thumb", "l_slider"}) {
+    const Body &x = m.bodies[m.FindBody(name)], &y = n.bodies[n.FindBody(name)];
+    EXPECT_NEAR(x.mass, y.mass, 1e-12) << name;
+    EXPECT_TRUE(x.I_Bcm_B.isApprox(y.I_Bcm_B, 1e-9)) << name;
+  }
+  const Pose X_palm =
+      n.joints[n.FindJoint("turned_fixed")].X_PF * n.joints[n.FindJoint("first_fixed")].X_PF *
+      n.joints[n.FindJoint("second_fixed")].X_PF * n.joints[n.FindJoint("l_yaw")].X_PF;
+  EXPECT_TRUE(m.joints[m.FindJoint("l_yaw")].X_PF.isApprox(X_palm, 1e-9));
+  for (const char* name : {"A", "l_yaw", "l_bend", "l_out"}) {
+    const Joint &x = m.joints[m.FindJoint(name)], &y = n.joints[n.FindJoint(name)];
+    EXPECT_NEAR(x.range[0].lower, y.range[0].lower, 1e-12) << name;
+    EXPECT_NEAR(x.range[0].upper, y.range[0].upper, 1e-12) << name;
+    const std::string element = std::string(name) + "_damping";
+    const auto damping = [&](const Mechanism& of) {
+      for (const ForceElement& e : of.elements) {
+        if (e.name == element) return std::get<DampingLaw>(e.law).damping;
+      }
+      return -1.0;
+    };
+    EXPECT_EQ(damping(m), damping(n)) << name;
+  }
+  const Pose X_pad =
+      n.joints[n.FindJoint("padded_fixed")].X_PF * n.FindFrame(n.FindBody("padded"), "l_pad")->X_BF;
+  EXPECT_TRUE(m.FindFrame(m.FindBody("l_thumb"), "l_pad")->X_BF.isApprox(X_pad, 1e-9));
+  // What refers to the hand alone comes with it; keyframes count from the hand's joints.
+  EXPECT_EQ(m.couplings.size(), 2u);
+  EXPECT_EQ(std::ranges::count_if(m.joints, &Joint::closure), 0);
+  ASSERT_EQ(m.drives.size(), 3u);
+  EXPECT_NEAR(m.joints[m.FindJoint("l_yaw")].home[0], 0.1, 1e-12);
+  EXPECT_NEAR(m.joints[m.FindJoint("l_bend")].home[0], 0.2 - std::numbers::pi / 18.0, 1e-12);
+  EXPECT_NEAR(m.joints[m.FindJoint("l_out")].home[0], 0.15, 1e-12);
+  EXPECT_NE(said.find("keyframe 'l_grip'"), std::string::npos) << said;
+  EXPECT_NE(said.find("<connect> 'outside' is not attached"), std::string::npos) << said;
+  EXPECT_NE(said.find("gravity = '0 0 -5' of the attached model is not taken"), std::string::npos);
+  const auto& shapes = m.bodies[m.FindBody("l_thumb")].shapes;
+  EXPECT_TRUE(std::ranges::any_of(shapes, [](const Shape& shape) {
+    const auto* mesh = std::get_if<Mesh>(&shape.geometry);
+    return mesh != nullptr && mesh->file.ends_with("meshes/tip.obj");
+  }));
+
+  // Twice, whole, and the model's own body once more.
+  const Read twice =
+      read_in(WithHand("<attach model='hand' body='thumb' prefix='l_'/><attach model='hand' "
+                       "body='thumb' prefix='r_'/>"));
+  EXPECT_FALSE(twice.model);  // 'l_yaw' of the drive is not there
+  const Read whole =
+      read_in(WithHand("<attach model='hand' prefix='l_'/><attach model='hand' prefix='r_'/>"));
+  ASSERT_TRUE(whole.model) << whole.diagnostics.Text();
+  EXPECT_EQ(whole.model->mechanism.couplings.size(), 4u);
+  EXPECT_EQ(std::ranges::count_if(whole.model->mechanism.joints, &Joint::closure), 2);
+  const Read own =
+      read_in(WithHand("<attach model='hand' body='palm' prefix='l_'/><body name='o'><attach "
+                       "body='l_palm' prefix='2'/></body>"));
+  ASSERT_TRUE(own.model) << own.diagnostics.Text();
+  EXPECT_EQ(own.model->mechanism.bodies[own.model->mechanism.FindBody("2l_palm")].mass,
+            m.bodies[m.FindBody("l_palm")].mass);
+  EXPECT_EQ(own.model->mechanism.couplings.size(), 4u);
+  EXPECT_EQ(own.model->mechanism.drives.size(), 5u);
+
+  // Models that multiply.
+  for (int i = 0; i < 8; ++i) {
+    const std::string next = fmt::format("m{}", i + 1);
+    std::string ten;
+    for (int k = 0; k < 10; ++k) ten += fmt::format("<attach model='{}' prefix='{}'/>", next, k);
+    folder.Write(fmt::format("m{}.xml", i), "<mujoco><asset><model name='" + next + "' file='" +
+                                                next + ".xml'/></asset><worldbody>" + ten +
+                                                "</worldbody></mujoco>");
+  }
+  folder.Write("m8.xml", "<mujoco><worldbody><body><joint/></body></worldbody></mujoco>");
+  // What cannot be expanded is an error at its place.
+  folder.Write("loop.xml",
+               "<mujoco><asset><model name='me' file='loop.xml'/></asset><worldbody>"
+               "<attach model='me' prefix='x'/></worldbody></mujoco>");
+  folder.Write("bound.xml", "<mujoco><compiler boundmass='0.1'/><worldbody/></mujoco>");
+  folder.Write("keys.xml",
+               "<mujoco><worldbody><body name='b'><joint/></body></worldbody>\n"
+               "<keyframe><key name='k' qpos='1 2'/></keyframe></mujoco>");
+  folder.Write("broken.xml", "<mujoco>\n<worldbody></mujoco>");
+  for (const auto& [attach, expected] : std::vector<std::pair<std::string, std::string>>{
+           {"model='hant' prefix='l'", "arm.xml:4:1: error: <attach> model 'hant': no <model>"},
+           {"model='hant' prefix='l'", "did you mean 'hand'?"},
+           {"model='hand' body='pal' prefix='l'", "the attached model has no such body"},
+           {"model='hand' frame='pal' prefix='l'", "the attached model has no such frame"},
+           {"model='hand' body='palm' frame='f' prefix='l'", "names both a body and a frame"},
+           {"model='hand' body='palm'", "arm.xml:4:1: error: <attach> has no prefix"},
+           {"prefix='l'", "names neither body nor frame"},
+           {"body='upp' prefix='l'", "the model has no such body"},
+           {"model='gone' prefix='l'", "file 'gone.xml' cannot be read"},
+           {"model='out' prefix='l'", "file '../out.xml' cannot be read"},
+           {"model='bound' prefix='l'", "compiled with boundmass = '0.1', the model with '0'"},
+           {"model='keys' prefix='l'",
+            "keys.xml:2:1: error: keyframe 'k' has 2 numbers in qpos, the model 1"},
+           {"model='broken' prefix='l'", "broken.xml:2:1: error: the file is not well-formed"},
+           {"model='m0' prefix='l'", "m4.xml:1:1: error: <attach> makes more than 20000 elements"},
+           {"model='loop' prefix='l'",
+            "loop.xml:1:1: error: <attach> model 'me': file 'loop.xml' "
+            "attaches itself"}}) {
+    std::string text = WithHand("<attach " + attach + "/>");
+    std::string assets;
+    for (const char* name : {"gone", "bound", "keys", "broken", "loop", "m0", "../out"}) {
+      assets += fmt::format("<model name='{}' file='{}.xml'/>",
+                            std::filesystem::path(name).stem().string(), name);
+    }
+    text.insert(text.find("<model "), assets);
+    const Read read = read_in(text);
+    EXPECT_FALSE(read.model) << attach;
+    EXPECT_NE(read.diagnostics.Text().find(expected), std::string::npos) << attach << "\n"
+                                                                         << read.diagnostics.Text();
+  }
+}
+
+// Options of the whole hold; where they are merged, what only the attached model states is taken.
+TEST(ForeignMjcf, OptionsOfAttachedModelsAreMergedWhereTheModelSaysSo) {
+  const test::TestFolder folder("merge");
+  folder.Write("hand.xml",
+               "<mujoco model='hand'><option gravity='0 0 -5'><flag damper='disable'/></option>"
+               "<worldbody><body name='b'><joint damping='1'/><geom size='1'/></body></worldbody>"
+               "</mujoco>");
+  const auto gravity = [&](const std::string& compiler, const std::string& option) {
+    const std::string text = "<mujoco><compiler " + compiler + "/>" + option +
+                             "<asset><model file='hand.xml'/></asset><worldbody>"
+                             "<attach model='hand' prefix=''/></worldbody></mujoco>";
+    Diagnostics diagnostics;
+    const auto model = ReadMjcf(text, folder.Write("arm.xml", text), "", &diagnostics);
+    return model ? std::pair(model->mechanism.gravity_W.z(), model->mechanism.elements.size())
+                 : std::pair(0.0, size_t{0});
+  };
+  EXPECT_EQ(gravity("", ""), std::pair(-9.81, size_t{1}));
+  EXPECT_EQ(gravity("conflict='merge'", ""), std::pair(-5.0, size_t{0}));
+  EXPECT_EQ(gravity("", "<option gravity='0 0 -1'/>"), std::pair(-1.0, size_t{1}));
+  EXPECT_EQ(gravity("conflict='error'", "<option gravity='0 0 -5'/>"), std::pair(-5.0, size_t{1}));
+  EXPECT_EQ(gravity("conflict='error'", "<option gravity='0 0 -1'/>"), std::pair(0.0, size_t{0}));
 }
 
 TEST(ForeignMjcf, PairsOfBodiesOfASceneElsewhereAreNotNeeded) {

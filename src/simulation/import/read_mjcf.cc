@@ -1,5 +1,7 @@
 #include "simulation/import/read_mjcf.h"
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "simulation/import/mjcf_import.h"
@@ -9,12 +11,26 @@ namespace mbv {
 namespace simulation {
 namespace {
 
-ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
-                    const std::string& base, Diagnostics* diagnostics) {
+// Compiles once more if attached models have keyframes: how long these are follows from the whole.
+ModelHandle Compile(mjcf::ForeignMjcf* foreign) {
+  ModelHandle model = CompileMjcf(foreign->Text());
+  std::map<std::string, int> address;
+  for (int j = 0; j < model->njnt; ++j) {
+    const char* name = mj_id2name(model.get(), mjOBJ_JOINT, j);
+    if (name != nullptr) address[name] = model->jnt_qposadr[j];
+  }
+  const std::vector<double> reference(model->qpos0, model->qpos0 + model->nq);
+  if (foreign->PlaceKeyframes(reference, address)) model = CompileMjcf(foreign->Text());
+  return model;
+}
+
+ImportedMjcf Import(mjcf::ForeignMjcf* source, const std::string& file, const std::string& base,
+                    Diagnostics* diagnostics) {
+  const mjcf::ForeignMjcf& foreign = *source;
   ImportedMjcf imported;
+  imported.model = Compile(source);
   imported.text = foreign.Text();
   imported.printed = RoundingOf(imported.text);
-  imported.model = CompileMjcf(imported.text);
   const mjModel& m = *imported.model;
   MjcfImport in{.m = m, .foreign = foreign, .file = file, .diagnostics = diagnostics, .base = base};
   in.mechanism.name = foreign.ModelName();
@@ -55,7 +71,7 @@ std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::strin
   constexpr int kMostRounds = 200;
   for (int round = 0; round < kMostRounds; ++round) {
     try {
-      ImportedMjcf imported = Import(foreign, file, base, diagnostics);
+      ImportedMjcf imported = Import(&foreign, file, base, diagnostics);
       for (const std::string& warning : warnings) {
         diagnostics->Add({Severity::kWarning, file, 0, 0, "MuJoCo: " + warning, ""});
       }

@@ -1,9 +1,12 @@
 #include "simulation/mjcf/foreign.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
@@ -12,6 +15,7 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "simulation/mjcf/foreign_attach.h"
 #include "simulation/mjcf/foreign_frames.h"
 #include "simulation/mjcf/foreign_rows.h"
 
@@ -57,6 +61,9 @@ int DepthOf(const XMLElement* element) {
 struct ForeignMjcf::Impl {
   XMLDocument document;
   fs::path file, folder;
+  fs::path top;                  // folder of the whole, of which no file lies outside
+  std::vector<fs::path> around;  // files of models that this one is attached to
+  std::vector<AttachedKey> attached_keys;
   Diagnostics* diagnostics = nullptr;
   std::map<std::string, SitePair> by_sites;
   std::map<std::string, ForeignMesh> meshes;
@@ -74,7 +81,7 @@ struct ForeignMjcf::Impl {
   // The path of a file that the model names, if it lies below the model's folder.
   [[nodiscard]] bool IsBelow(const fs::path& path) const {
     std::error_code error;
-    const fs::path base = fs::weakly_canonical(folder, error);
+    const fs::path base = fs::weakly_canonical(top, error);
     const fs::path inside = fs::weakly_canonical(path, error).lexically_relative(base);
     return !error && !inside.empty() && *inside.begin() != "..";
   }
@@ -140,6 +147,113 @@ struct ForeignMjcf::Impl {
     document.DeleteNode(include);
   }
 
+  // Since MuJoCo 3.2 parts of other models, and of the model itself, stand where <attach> is.
+  void AttachModels() {
+    constexpr int kMost = 20'000;  // elements; models that attach models may multiply
+    bool named = false;
+    while (good) {
+      XMLElement* attach = nullptr;
+      int elements = 0;
+      ForEach(root(), [&](XMLElement* e) {
+        ++elements;
+        if (attach == nullptr && IsTag(e, "attach")) attach = e;
+      });
+      if (attach == nullptr) break;
+      if (elements > kMost) {
+        Add(Severity::kError, attach->GetLineNum(),
+            fmt::format("<attach> makes more than {} elements", kMost));
+        return;
+      }
+      if (!named) NameMainDefault("main of the model", &document);
+      named = true;
+      if (attach->Attribute("model") == nullptr) {
+        XMLDocument own;
+        document.DeepCopy(&own);
+        Take(Attach(attach, folder, {}, true, &own), file.string());
+      } else {
+        AttachModel(attach);
+      }
+    }
+  }
+
+  void AttachModel(XMLElement* attach) {
+    const std::string name = attach->Attribute("model");
+    std::string path;
+    std::vector<std::string> names;
+    Impl model;
+    model.diagnostics = diagnostics;
+    for (XMLElement* asset : ModelAssets()) {
+      const char *own = asset->Attribute("name"), *from = asset->Attribute("file");
+      if (from == nullptr) continue;
+      names.emplace_back(own == nullptr ? ModelNameOf(folder / from) : own);
+      if (names.back() == name) path = from;
+    }
+    if (path.empty()) {
+      return Add(Severity::kError, attach->GetLineNum(),
+                 fmt::format("<attach> model '{}': no <model> of the assets has this name", name),
+                 DidYouMean(name, names));
+    }
+    model.file = folder / path;
+    model.folder = model.file.parent_path();
+    model.top = top;
+    model.around = around;
+    model.around.push_back(fs::weakly_canonical(file));
+    const auto text = IsBelow(model.file) ? ReadWholeFile(model.file) : std::nullopt;
+    if (!text) {
+      return Add(Severity::kError, attach->GetLineNum(),
+                 fmt::format("<attach> model '{}': file '{}' cannot be read", name, path),
+                 "it must be an MJCF file in the model's folder or below");
+    }
+    if (std::ranges::find(model.around, fs::weakly_canonical(model.file)) != model.around.end()) {
+      return Add(Severity::kError, attach->GetLineNum(),
+                 fmt::format("<attach> model '{}': file '{}' attaches itself", name, path));
+    }
+    model.Parse(*text);
+    if (model.good) model.TakeIncludes();
+    if (model.good) model.AttachModels();
+    good = model.good;
+    if (!good) return;
+    Take(Attach(attach, model.folder, std::move(model.attached_keys), false, &model.document),
+         model.file.string());
+  }
+
+  void Take(Attachment attachment, const std::string& model) {
+    for (const std::string& remark : attachment.remarks) {
+      diagnostics->Add({Severity::kWarning, model, 0, 0, remark, ""});
+    }
+    std::ranges::move(attachment.keys, std::back_inserter(attached_keys));
+    const FrameTrouble& trouble = attachment.trouble;
+    if (trouble.text.empty()) return;
+    good = false;
+    diagnostics->Add({Severity::kError, attachment.in_model ? model : file.string(), trouble.line,
+                      trouble.line > 0 ? 1 : 0, trouble.text, trouble.hint});
+  }
+
+  std::vector<XMLElement*> ModelAssets() {
+    std::vector<XMLElement*> assets;
+    for (XMLElement* section = root()->FirstChildElement("asset"); section != nullptr;
+         section = section->NextSiblingElement("asset")) {
+      for (XMLElement* e = section->FirstChildElement("model"); e != nullptr;
+           e = e->NextSiblingElement("model")) {
+        assets.push_back(e);
+      }
+    }
+    return assets;
+  }
+
+  void DropModelAssets() {
+    for (XMLElement* asset : ModelAssets()) document.DeleteNode(asset);
+  }
+
+  [[nodiscard]] std::string ModelNameOf(const fs::path& path) const {
+    const auto text = IsBelow(path) ? ReadWholeFile(path) : std::nullopt;
+    XMLDocument model;
+    if (!text || model.Parse(text->c_str(), text->size()) != tinyxml2::XML_SUCCESS) return "";
+    const char* name =
+        model.RootElement() == nullptr ? nullptr : model.RootElement()->Attribute("model");
+    return name == nullptr ? "" : name;
+  }
+
   // What dynamics without contacts do not need.
   void DropPictures() {
     MeshGeoms geoms = TakeMeshGeoms(
@@ -159,6 +273,7 @@ struct ForeignMjcf::Impl {
     };
     ForEach(root(), [&](XMLElement* e) {
       for (const char* attribute : {"material", "texture"}) e->DeleteAttribute(attribute);
+      if (IsTag(e, "camera") || IsTag(e, "light")) others.push_back(e);
       const bool in_assets = e->Parent() != nullptr && e->Parent()->ToElement() != nullptr &&
                              IsTag(e->Parent()->ToElement(), "asset");
       if (in_assets && (IsTag(e, "texture") || IsTag(e, "material") || IsTag(e, "skin"))) {
@@ -467,10 +582,12 @@ struct ForeignMjcf::Impl {
 ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnostics* diagnostics)
     : impl_(std::make_unique<Impl>()) {
   impl_->file = file;
-  impl_->folder = file.parent_path();
+  impl_->folder = impl_->top = file.parent_path();
   impl_->diagnostics = diagnostics;
   impl_->Parse(text);
   if (ok()) impl_->TakeIncludes();
+  if (ok()) impl_->AttachModels();
+  if (ok()) impl_->DropModelAssets();
   if (ok()) impl_->SwitchOff();
   if (ok()) impl_->WriteOutFrames();
   if (ok()) impl_->DropPictures();
@@ -498,6 +615,32 @@ std::string ForeignMjcf::ModelName() const {
 }
 
 const std::vector<ModelCaveat>& ForeignMjcf::left_out() const { return impl_->left_out; }
+
+bool ForeignMjcf::PlaceKeyframes(const std::vector<double>& reference,
+                                 const std::map<std::string, int>& address) {
+  // Where an attached model is replicated, its keyframes are about none of the copies.
+  std::erase_if(impl_->attached_keys, [&](const AttachedKey& key) {
+    return std::ranges::none_of(key.qpos,
+                                [&](const auto& of) { return address.contains(of.first); });
+  });
+  if (impl_->attached_keys.empty()) return false;
+  XMLDocument& document = impl_->document;
+  XMLElement* section = document.NewElement("keyframe");
+  impl_->root()->InsertEndChild(section);
+  for (const AttachedKey& key : impl_->attached_keys) {
+    std::vector<double> qpos = reference;
+    for (const auto& [joint, values] : key.qpos) {
+      const auto at = address.find(joint);
+      if (at != address.end()) std::ranges::copy(values, qpos.begin() + at->second);
+    }
+    XMLElement* e = document.NewElement("key");
+    e->SetAttribute("name", key.name.c_str());
+    e->SetAttribute("qpos", fmt::format("{}", fmt::join(qpos, " ")).c_str());
+    section->InsertEndChild(e);
+  }
+  impl_->attached_keys.clear();
+  return true;
+}
 
 const std::map<std::string, SitePair>& ForeignMjcf::closures_by_sites() const {
   return impl_->by_sites;

@@ -30,8 +30,8 @@ struct ForeignMesh {
 /// pose, of others such spheres stand beside them: the compiler moves the frames of meshes, not
 /// theirs. Files outside the model's folder are refused. What MuJoCo 3 says differently is
 /// translated: closures by two sites, ranges that hold without being called limited, <frame>,
-/// <replicate>, springs or dampers switched off. Every element and attribute is looked up in
-/// foreign_rows.h.
+/// <replicate>, <attach>, springs or dampers switched off. Every element and attribute is looked up
+/// in foreign_rows.h.
 class ForeignMjcf {
  public:
   ForeignMjcf(const std::string& text, const std::filesystem::path& file, Diagnostics* diagnostics);
@@ -52,6 +52,11 @@ class ForeignMjcf {
 
   /// What acts on forces and is left out, as the text alone shows; findings name it, too.
   [[nodiscard]] const std::vector<ModelCaveat>& left_out() const;
+
+  /// Writes the keyframes of attached models: `reference` is the pose of the whole without any,
+  /// `address` is where a joint's coordinates begin in it. False if there are none.
+  [[nodiscard]] bool PlaceKeyframes(const std::vector<double>& reference,
+                                    const std::map<std::string, int>& address);
 
   /// Removes what this compiler does not know, as its message says; one finding for each kind of
   /// thing. False if the message is about something else.

@@ -28,11 +28,53 @@ bool IsOneOf(const XMLElement* e, std::initializer_list<const char*> tags) {
   return false;
 }
 
+}  // namespace
+
+double AngleUnit(const XMLElement* root) {
+  double unit = std::numbers::pi / 180.0;
+  for (const XMLElement* e = root->FirstChildElement("compiler"); e != nullptr;
+       e = e->NextSiblingElement("compiler")) {
+    const char* angle = e->Attribute("angle");
+    if (angle != nullptr) unit = std::string_view(angle) == "radian" ? 1.0 : std::numbers::pi / 180;
+  }
+  return unit;
+}
+
+const char* Inherited(const XMLElement* e, const char* attribute) {
+  if (const char* own = e->Attribute(attribute)) return own;
+  const XMLElement* root = e->GetDocument()->RootElement();
+  const char* name = e->Attribute("class");
+  for (const XMLNode* up = e->Parent(); name == nullptr && up != nullptr; up = up->Parent()) {
+    if (up->ToElement() != nullptr) name = up->ToElement()->Attribute("childclass");
+  }
+  const XMLElement* of_class = nullptr;
+  const auto visit = [&](const auto& self, const XMLElement* parent) -> void {
+    for (const XMLElement* d = parent->FirstChildElement("default"); d != nullptr;
+         d = d->NextSiblingElement("default")) {
+      const char* is = d->Attribute("class");
+      const bool meant =
+          name == nullptr ? parent == root : is != nullptr && std::string_view(is) == name;
+      if (meant && of_class == nullptr) of_class = d;
+      self(self, d);
+    }
+  };
+  visit(visit, root);
+  for (const XMLElement* d = of_class; d != nullptr && IsTag(d, "default");
+       d = d->Parent()->ToElement()) {
+    const XMLElement* row = d->FirstChildElement(e->Name());
+    const char* value = row == nullptr ? nullptr : row->Attribute(attribute);
+    if (value != nullptr) return value;
+  }
+  return nullptr;
+}
+
+namespace {
+
 class FrameDissolver {
  public:
   explicit FrameDissolver(tinyxml2::XMLDocument* document) : document_(*document) {}
 
-  FrameTrouble Run() {
+  FrameTrouble Run(std::optional<double> unit) {
     ReadCompiler();
     // The innermost first: names get its suffix before those of the outer ones.
     while (trouble_.text.empty()) {
@@ -51,6 +93,7 @@ class FrameDissolver {
       if (outermost == nullptr) break;
       Dissolve(outermost);
     }
+    if (unit && trouble_.text.empty()) StateAngles(*unit);
     return trouble_;
   }
 
@@ -62,11 +105,9 @@ class FrameDissolver {
   }
 
   void ReadCompiler() {
+    unit_ = AngleUnit(root());
     for (XMLElement* e = root()->FirstChildElement("compiler"); e != nullptr;
          e = e->NextSiblingElement("compiler")) {
-      if (const char* angle = e->Attribute("angle")) {
-        unit_ = std::string_view(angle) == "radian" ? 1.0 : std::numbers::pi / 180.0;
-      }
       if (const char* order = e->Attribute("eulerseq")) order_ = order;
     }
   }
@@ -84,29 +125,6 @@ class FrameDissolver {
   Vec3 Vector(const XMLElement* e, const char* attribute, const char* text) {
     const std::vector<double> v = Numbers(e, attribute, text, 3);
     return {v[0], v[1], v[2]};
-  }
-
-  // An attribute's text: the element's own, or that of its class; null without one.
-  const char* Inherited(const XMLElement* e, const char* attribute) {
-    if (const char* own = e->Attribute(attribute)) return own;
-    const char* name = e->Attribute("class");
-    for (const XMLNode* up = e->Parent(); name == nullptr && up != nullptr; up = up->Parent()) {
-      if (up->ToElement() != nullptr) name = up->ToElement()->Attribute("childclass");
-    }
-    const XMLElement* of_class = nullptr;
-    ForEach(root(), [&](XMLElement* d) {
-      if (!IsTag(d, "default") || of_class != nullptr) return;
-      const char* is = d->Attribute("class");
-      const bool main = d->Parent() == root();
-      if (name == nullptr ? main : is != nullptr && std::string_view(is) == name) of_class = d;
-    });
-    for (const XMLElement* d = of_class; d != nullptr && IsTag(d, "default");
-         d = d->Parent()->ToElement()) {
-      const XMLElement* row = d->FirstChildElement(e->Name());
-      const char* value = row == nullptr ? nullptr : row->Attribute(attribute);
-      if (value != nullptr) return value;
-    }
-    return nullptr;
   }
 
   Mat3 EulerRotation(const Vec3& angles) const {
@@ -189,14 +207,56 @@ class FrameDissolver {
         }
       }
       Shift(X, child);
-      if (IsOneOf(child, {"camera", "light"})) {  // pictures of others
-        document_.DeleteNode(child);
-      } else {
-        last = parent->InsertAfterChild(last, child);
-      }
+      last = parent->InsertAfterChild(last, child);
       if (!trouble_.text.empty()) return;
     }
     document_.DeleteNode(frame);
+  }
+
+  // Orientations as quaternions, angles of joints in `unit`; no class states any.
+  void StateAngles(double unit) {
+    std::vector<XMLElement*> rows;
+    ForEach(root(), [&](XMLElement* e) {
+      const auto* parent = e->Parent()->ToElement();
+      if (parent != nullptr && IsTag(parent, "default")) {
+        rows.push_back(e);
+      } else if (IsOneOf(e, {"body", "geom", "site", "inertial"})) {
+        StateOrientation(e);
+      } else if (IsTag(e, "joint") && parent != nullptr && IsOneOf(parent, {"body", "worldbody"})) {
+        StateJoint(unit, e);
+      }
+    });
+    for (XMLElement* row : rows) {
+      for (const char* attribute : kOrientations) row->DeleteAttribute(attribute);
+      if (!IsTag(row, "joint")) continue;
+      for (const char* attribute : {"range", "ref", "springref"}) row->DeleteAttribute(attribute);
+    }
+  }
+
+  void StateOrientation(XMLElement* e) {
+    bool turned = false;
+    for (const char* each : kOrientations) turned = turned || Inherited(e, each) != nullptr;
+    const bool spans = IsOneOf(e, {"geom", "site"}) && Inherited(e, "fromto") != nullptr;
+    if (turned && !spans) SetPose(e, PoseOf(e));
+  }
+
+  void StateJoint(double unit, XMLElement* e) {
+    const char* type = Inherited(e, "type");
+    const bool turns =
+        type == nullptr || std::string_view(type) == "hinge" || std::string_view(type) == "ball";
+    const double factor = turns ? unit_ / unit : 1.0;
+    for (const auto& [attribute, count] : {std::pair("range", 2), {"ref", 1}, {"springref", 1}}) {
+      const char* text = Inherited(e, attribute);
+      if (text == nullptr) continue;
+      std::string scaled = text;
+      if (factor != 1.0) {
+        scaled.clear();
+        for (const double x : Numbers(e, attribute, text, static_cast<size_t>(count))) {
+          scaled += fmt::format("{}{}", scaled.empty() ? "" : " ", factor * x);
+        }
+      }
+      e->SetAttribute(attribute, scaled.c_str());
+    }
   }
 
   // Poses an element of a frame as if it stood outside.
@@ -349,7 +409,11 @@ class FrameDissolver {
 }  // namespace
 
 FrameTrouble DissolveFrames(tinyxml2::XMLDocument* document) {
-  return FrameDissolver(document).Run();
+  return FrameDissolver(document).Run({});
+}
+
+FrameTrouble DissolveFrames(double unit, tinyxml2::XMLDocument* document) {
+  return FrameDissolver(document).Run(unit);
 }
 
 namespace {

@@ -15,10 +15,9 @@
 namespace mbv::mjcf {
 
 // Calls visit(element) on all elements below, deepest last.
-template <typename Visit>
-void ForEach(tinyxml2::XMLElement* element, const Visit& visit) {
-  for (tinyxml2::XMLElement* e = element->FirstChildElement(); e != nullptr;
-       e = e->NextSiblingElement()) {
+template <typename Element, typename Visit>
+void ForEach(Element* element, const Visit& visit) {
+  for (Element* e = element->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
     visit(e);
     ForEach(e, visit);
   }
@@ -37,6 +36,16 @@ struct FrameTrouble {
 /// Writes out what <replicate> repeats, with the elements that refer to it, and moves what stands
 /// in a <frame> to the body around it, posed as it was.
 [[nodiscard]] FrameTrouble DissolveFrames(tinyxml2::XMLDocument* document);
+
+/// The same; then states all orientations as quaternions and the angles of joints in a unit [rad],
+/// each at its element, so that neither depends on the document's <compiler>.
+[[nodiscard]] FrameTrouble DissolveFrames(double unit, tinyxml2::XMLDocument* document);
+
+/// The unit of angles that a document's <compiler> states [rad].
+[[nodiscard]] double AngleUnit(const tinyxml2::XMLElement* root);
+
+/// An attribute's text: the element's own, or that of its class; null without one.
+[[nodiscard]] const char* Inherited(const tinyxml2::XMLElement* e, const char* attribute);
 
 // Mesh geoms of foreign MJCF files. Internal to mjcf/.
 

@@ -74,7 +74,8 @@ const ForeignRow kRows[] = {
     {"asset/material", "*", kNoForce},
     {"asset/skin", "*", kNoForce},
     {"asset/hfield", "*", kNoForce},  // touches only
-    {"asset/model", "*", kNoForce},   // <attach> brings it in
+    {"asset/model", "name file", kTaken},
+    {"asset/model", "content_type", kNoForce},
     {"skin/bone", "*", kNoForce},
     {"material/layer", "*", kNoForce},
     {"mesh/plugin", "", kLeftOut, "masses follow from a mesh that is missing"},
@@ -86,8 +87,7 @@ const ForeignRow kRows[] = {
     {"body", "gravcomp", kLeftOut, "a force carries a share of the body's weight", "0"},
     {"frame", "name childclass pos quat axisangle xyaxes zaxis euler", kTaken},
     {"replicate", "count offset euler sep childclass", kTaken},
-    {"body/attach", "", kRefused, "bodies of another model belong to the robot"},
-    {"body/attach", "*", kNoForce},
+    {"body/attach", "model body frame prefix", kTaken},
     {"body/inertial", "pos quat mass diaginertia axisangle xyaxes zaxis euler fullinertia", kTaken},
     {"body/joint", "name class type pos axis springdamper limited range margin stiffness ref "
                    "springref armature damping frictionloss", kTaken},
