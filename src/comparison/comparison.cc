@@ -47,7 +47,7 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
     if (IsEngine(witness.witness) && IsTaskSpace(*input.motion) &&
         !witness.metrics.contains(Metric::kCommandVelocity)) {
       note(witness.witness + "." + RowOf(Metric::kCommandVelocity).key,
-           "the rates of the commanded outputs are not recorded");
+           "the rates of the commanded coordinates are not recorded");
     }
   }
   for (const Witness& witness : input.witnesses) {

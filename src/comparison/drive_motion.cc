@@ -57,10 +57,7 @@ bool AllCommanded(const ComparisonInput& input, Metric metric) {
 bool OnlyDriveCommands(const ComparisonInput& input, Metric metric) {
   for (const Command& command : input.motion->commands) {
     const Coordinate& first = command.terms.front().coordinate;
-    bool angle = first.component >= 3;
-    if (first.kind == Coordinate::Kind::kDrive) {
-      angle = PositionUnit(*input.mechanism, input.mechanism->drives[first.index]) == "rad";
-    }
+    const bool angle = !IsLength(*input.mechanism, first);
     const bool recorded =
         std::none_of(command.terms.begin(), command.terms.end(), [](const Command::Term& term) {
           return term.coordinate.kind == Coordinate::Kind::kPrescribed;
@@ -73,11 +70,15 @@ bool OnlyDriveCommands(const ComparisonInput& input, Metric metric) {
 
 }  // namespace
 
+bool IsOfTask(const Coordinate& coordinate) {
+  return coordinate.kind == Coordinate::Kind::kOutput ||
+         coordinate.kind == Coordinate::Kind::kJoint;
+}
+
 bool IsTaskSpace(const Motion& motion) {
   return std::any_of(motion.commands.begin(), motion.commands.end(), [](const Command& command) {
-    return std::any_of(command.terms.begin(), command.terms.end(), [](const Command::Term& term) {
-      return term.coordinate.kind == Coordinate::Kind::kOutput;
-    });
+    return std::any_of(command.terms.begin(), command.terms.end(),
+                       [](const Command::Term& term) { return IsOfTask(term.coordinate); });
   });
 }
 
@@ -112,9 +113,11 @@ std::string SimulationDriving(const ComparisonInput& input) {
   }
   const Role* driver = FindRole(input.driven_by);
   return fmt::format(
-      "commanded in {} space, the simulation follows the drive positions, rates and accelerations "
-      "that the {} computes",
-      IsTaskSpace(*input.motion) ? "task" : "joint",
+      "commanded in {}, the simulation follows the drive positions, rates and accelerations that "
+      "the {} computes",
+      !IsTaskSpace(*input.motion)              ? "joint space"
+      : input.motion->RecordedJoints().empty() ? "task space"
+                                               : "coordinates of passive joints",
       (driver == nullptr ? role::kSolver : *driver).method);
 }
 

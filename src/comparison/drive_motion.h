@@ -10,7 +10,9 @@ namespace mbv {
 /// One sentence about who gives the simulation its motion; "" where nothing was simulated.
 [[nodiscard]] std::string DrivingText(const ComparisonInput& input);
 
-/// True when some command is about an output: drive motions are then computed, not given.
+/// True of coordinates of outputs and of joints without a drive.
+[[nodiscard]] bool IsOfTask(const Coordinate& coordinate);
+/// True when some command is about one of these: drive motions are then computed, not given.
 [[nodiscard]] bool IsTaskSpace(const Motion& motion);
 
 /// True when the commands determine every drive's motion, so that all computations are given it.

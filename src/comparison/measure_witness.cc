@@ -4,20 +4,23 @@
 
 #include "comparison/comparison.h"
 #include "comparison/derivatives.h"
+#include "comparison/drive_motion.h"
 #include "comparison/energy_audit.h"
 #include "comparison/force_scale.h"
 #include "comparison/motor_load.h"
+#include "mechanism/followed_state.h"
 
 namespace mbv {
 namespace {
 
 // What a coordinate and its rates are recorded as.
 struct Recorded {
-  Quantity drive, output;
+  Quantity drive, output, joint;
 };
-constexpr Recorded kValue{Quantity::kPosition, Quantity::kPose};
-constexpr Recorded kRate{Quantity::kVelocity, Quantity::kPoseVelocity};
-constexpr Recorded kRate2{Quantity::kAcceleration, Quantity::kPoseAcceleration};
+constexpr Recorded kValue{Quantity::kPosition, Quantity::kPose, Quantity::kJointPosition};
+constexpr Recorded kRate{Quantity::kVelocity, Quantity::kPoseVelocity, Quantity::kJointVelocity};
+constexpr Recorded kRate2{Quantity::kAcceleration, Quantity::kPoseAcceleration,
+                          Quantity::kJointAcceleration};
 
 // -1 where it is not recorded.
 int ColumnOf(const Mechanism& mechanism, const Coordinate& coordinate, const Recorded& as,
@@ -28,8 +31,9 @@ int ColumnOf(const Mechanism& mechanism, const Coordinate& coordinate, const Rec
       return trace.Find(as.drive, mechanism.drives[index].name);
     case Coordinate::Kind::kOutput:
       return trace.Find(as.output, mechanism.outputs[index].name, coordinate.component);
-    case Coordinate::Kind::kPrescribed:
     case Coordinate::Kind::kJoint:
+      return trace.Find(as.joint, NameOf(mechanism, coordinate));
+    case Coordinate::Kind::kPrescribed:
       return -1;
   }
   return -1;
@@ -71,17 +75,18 @@ void MeasureCommands(const ComparisonInput& input, const Trace& trace, WitnessMe
   }
 }
 
-// Rates or accelerations of commanded outputs against their commands, pooled per unit. A command
-// that holds still is judged by what counts as rest beside the drives' motion.
+// Rates or accelerations of commanded outputs and passive joints against their commands, pooled per
+// unit. A command that holds still is judged by what counts as rest beside the drives' motion.
 void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, Metric metric,
                          WitnessMetrics* out) {
   const bool velocity = metric == Metric::kCommandVelocity;
   std::map<bool, ErrorSum> sums;  // by angle
   for (const Command& command : input.motion->commands) {
-    if (command.terms.front().coordinate.kind != Coordinate::Kind::kOutput) continue;
+    const Coordinate& first = command.terms.front().coordinate;
+    if (!IsOfTask(first)) continue;
     const auto columns = ColumnsOf(*input.mechanism, command, trace, velocity ? kRate : kRate2);
     if (!columns) continue;
-    ErrorSum& sum = sums[command.terms.front().coordinate.component >= 3];
+    ErrorSum& sum = sums[!IsLength(*input.mechanism, first)];
     for (size_t i = 0; i < trace.time_s.size(); ++i) {
       const Jet jet = Evaluate(command.profile, trace.time_s[i]);
       const double wanted = velocity ? jet.rate : jet.acceleration;

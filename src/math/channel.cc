@@ -5,7 +5,7 @@
 namespace mbv {
 namespace {
 
-enum class Subject { kNone, kDrive, kBase, kOutput, kJoint, kMechanism };
+enum class Subject { kNone, kDrive, kBase, kOutput, kCoordinate, kJoint, kMechanism };
 
 struct QuantityRow {
   Quantity quantity;
@@ -28,6 +28,9 @@ constexpr QuantityRow kQuantities[] = {
     {Quantity::kPose, Subject::kOutput, "", ""},
     {Quantity::kPoseVelocity, Subject::kOutput, "velocity", ""},
     {Quantity::kPoseAcceleration, Subject::kOutput, "acceleration", ""},
+    {Quantity::kJointPosition, Subject::kCoordinate, "position", ""},
+    {Quantity::kJointVelocity, Subject::kCoordinate, "velocity", ""},
+    {Quantity::kJointAcceleration, Subject::kCoordinate, "acceleration", ""},
     {Quantity::kReaction, Subject::kJoint, "reaction", ""},
     {Quantity::kLoopGap, Subject::kMechanism, "closure.position", "m"},
     {Quantity::kLoopTwist, Subject::kMechanism, "closure.rotation", "rad"},
@@ -67,6 +70,7 @@ std::string ChannelName(Quantity quantity, const std::string& subject, int compo
       break;
     case Subject::kDrive:
     case Subject::kBase:
+    case Subject::kCoordinate:
       return subject + Point(row.word);
     case Subject::kOutput:
       return subject + Point(ComponentWord(kPoseComponents, component)) + Point(row.word);
@@ -95,6 +99,7 @@ std::string SignalWord(const Channel& channel) {
       return channel.name;
     case Subject::kDrive:
     case Subject::kBase:
+    case Subject::kCoordinate:
     case Subject::kMechanism:
       return row.word;
     case Subject::kOutput:

@@ -27,6 +27,10 @@ enum class Quantity {
   kPose,
   kPoseVelocity,
   kPoseAcceleration,
+  // Of a joint's coordinate without a drive.
+  kJointPosition,
+  kJointVelocity,
+  kJointAcceleration,
   // Of a joint, in its frame F, one of kReactionComponents.
   kReaction,
   // Of the mechanism.
@@ -58,8 +62,9 @@ struct Channel {
   std::string unit;   ///< SI: "m", "rad", "m/s", "N", "N m", "W", …; "1" when dimensionless
   std::string frame;  ///< the frame its components are expressed in; empty for scalars
   Quantity quantity = Quantity::kOwn;
-  std::string subject = {};  ///< drive, prescribed joint, output or joint; "" of the mechanism
-  int component = -1;        ///< of a pose or a reaction
+  /// Drive, prescribed joint, output, joint or its coordinate; "" of the mechanism.
+  std::string subject = {};
+  int component = -1;  ///< of a pose or a reaction
 };
 
 /// "limb1.drive.force", "platform.yaw.velocity", "hinge.reaction.fz", "power.base": never kOwn. A

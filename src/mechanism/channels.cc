@@ -1,5 +1,7 @@
 #include "mechanism/channels.h"
 
+#include "mechanism/followed_state.h"
+
 namespace mbv {
 namespace {
 
@@ -53,6 +55,17 @@ std::vector<Channel> OutputRateChannels(const Mechanism& mechanism, const Output
       channels.push_back(MakeChannel(quantity, PerTime(PoseUnit(c), power), output.name, frame, c));
     }
   }
+  return channels;
+}
+
+std::vector<Channel> JointChannels(const Mechanism& mechanism, const Coordinate& coordinate,
+                                   bool rates) {
+  const std::string name = NameOf(mechanism, coordinate);
+  const std::string unit = CoordinateUnit(mechanism, coordinate);
+  std::vector<Channel> channels = {MakeChannel(Quantity::kJointPosition, unit, name)};
+  if (!rates) return channels;
+  channels.push_back(MakeChannel(Quantity::kJointVelocity, PerTime(unit, ""), name));
+  channels.push_back(MakeChannel(Quantity::kJointAcceleration, PerTime(unit, "^2"), name));
   return channels;
 }
 
@@ -116,12 +129,12 @@ std::vector<Channel> WorkChannels(const Mechanism& mechanism) {
   return channels;
 }
 
-size_t MostChannels(const Mechanism& mechanism) {
-  constexpr size_t kPerReaction = 6;
+size_t MostChannels(const Mechanism& mechanism, const Motion& motion) {
+  constexpr size_t kPerReaction = 6, kPerCoordinate = 3;
   return DriveChannels(mechanism).size() + OutputChannels(mechanism).size() +
          PrescribedChannels(mechanism).size() + BandChannels(mechanism).size() +
          kPerReaction * mechanism.joints.size() + AuditChannels().size() + EnergyChannels().size() +
-         WorkChannels(mechanism).size();
+         WorkChannels(mechanism).size() + kPerCoordinate * motion.RecordedJoints().size();
 }
 
 }  // namespace mbv

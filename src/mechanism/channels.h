@@ -6,6 +6,7 @@
 
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
 
 namespace mbv {
 
@@ -20,6 +21,9 @@ namespace mbv {
 /// first and second time derivatives of the components of one output.
 [[nodiscard]] std::vector<Channel> OutputRateChannels(const Mechanism& mechanism,
                                                       const Output& output);
+/// COORDINATE.position of a joint's coordinate and, with `rates`, .velocity and .acceleration.
+[[nodiscard]] std::vector<Channel> JointChannels(const Mechanism& mechanism,
+                                                 const Coordinate& coordinate, bool rates);
 /// PRESCRIBED.force for every prescribed joint: the base reaction along its coordinate.
 [[nodiscard]] std::vector<Channel> PrescribedChannels(const Mechanism& mechanism);
 /// DRIVE.force.band for every drive, then PRESCRIBED.force.band: half-width of the band around the
@@ -42,7 +46,7 @@ namespace mbv {
 
 // How much a witness records.
 
-/// Channels (mechanism/channels.h) that a witness records of a mechanism at most.
-[[nodiscard]] size_t MostChannels(const Mechanism& mechanism);
+/// Channels (mechanism/channels.h) that a witness records of a motion at most.
+[[nodiscard]] size_t MostChannels(const Mechanism& mechanism, const Motion& motion);
 
 }  // namespace mbv

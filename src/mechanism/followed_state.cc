@@ -6,14 +6,6 @@
 #include <cmath>
 
 namespace mbv {
-namespace {
-
-bool IsSame(const Coordinate& a, const Coordinate& b) {
-  return a.kind == b.kind && a.index == b.index && a.component == b.component;
-}
-
-}  // namespace
-
 std::string NameOf(const Mechanism& mechanism, const Coordinate& coordinate) {
   const auto index = static_cast<size_t>(coordinate.index);
   switch (coordinate.kind) {
@@ -51,10 +43,10 @@ std::vector<FollowedAngle> FollowedAngles(const Mechanism& mechanism, const Moti
 
 double StartAngle(const Mechanism& mechanism, const Motion& motion, const Coordinate& coordinate) {
   for (const InitialValue& value : motion.initial) {
-    if (IsSame(value.coordinate, coordinate)) return value.position;
+    if (value.coordinate == coordinate) return value.position;
   }
   for (const Command& command : motion.commands) {
-    if (command.terms.size() != 1 || !IsSame(command.terms[0].coordinate, coordinate)) continue;
+    if (command.terms.size() != 1 || !(command.terms[0].coordinate == coordinate)) continue;
     return Evaluate(command.profile, 0.0).value / command.terms[0].factor;
   }
   return HomeValue(mechanism, coordinate);
@@ -71,7 +63,7 @@ RunSummary LoadHasNoValue(const Mechanism& mechanism, const Load& load, const Lo
   summary.message = fmt::format("the expression of {} is {} at t = {:.6g} s", summary.where,
                                 std::isnan(value) ? "not a number" : "infinite", t_s);
   const auto same = [](const StateFunction::Input& a, const StateFunction::Input& b) {
-    return a.rate == b.rate && IsSame(a.coordinate, b.coordinate);
+    return a.rate == b.rate && a.coordinate == b.coordinate;
   };
   for (size_t i = 0; i < inputs.size(); ++i) {
     const StateFunction::Input& input = part.function.inputs[i];

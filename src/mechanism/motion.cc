@@ -55,6 +55,38 @@ std::vector<NamedCoordinate> NamedCommandCoordinates(const Mechanism& mechanism)
   return named;
 }
 
+namespace {
+
+// The drive or the prescribed joint that a joint's coordinate belongs to, else itself.
+Coordinate OwnerOf(const Mechanism& mechanism, const Coordinate& joint) {
+  for (size_t p = 0; p < mechanism.prescribed.size(); ++p) {
+    if (mechanism.prescribed[p].joint != joint.index) continue;
+    return {Coordinate::Kind::kPrescribed, static_cast<int>(p), 0};
+  }
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    const auto* on = std::get_if<JointDrive>(&mechanism.drives[d].kind);
+    if (on == nullptr || on->joint != joint.index || on->coordinate != joint.component) continue;
+    return {Coordinate::Kind::kDrive, static_cast<int>(d), 0};
+  }
+  return joint;
+}
+
+}  // namespace
+
+std::vector<NamedCoordinate> NamedMotionCoordinates(const Mechanism& mechanism) {
+  std::vector<NamedCoordinate> named = NamedCommandCoordinates(mechanism);
+  const size_t own = named.size();
+  for (NamedCoordinate& joint : NamedJointCoordinates(mechanism)) {
+    const JointKind kind = mechanism.joints[static_cast<size_t>(joint.coordinate.index)].kind;
+    const bool taken =
+        std::any_of(named.begin(), named.begin() + static_cast<std::ptrdiff_t>(own),
+                    [&](const NamedCoordinate& other) { return other.name == joint.name; });
+    if (taken || IsOfBall(kind, joint.coordinate.component)) continue;
+    named.push_back({std::move(joint.name), OwnerOf(mechanism, joint.coordinate)});
+  }
+  return named;
+}
+
 std::vector<NamedCoordinate> NamedJointCoordinates(const Mechanism& mechanism) {
   std::vector<NamedCoordinate> named;
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
@@ -112,6 +144,19 @@ int Motion::FindCommand(const std::string& command_name) const {
     if (commands[i].name == command_name) return static_cast<int>(i);
   }
   return -1;
+}
+
+std::vector<Coordinate> Motion::RecordedJoints() const {
+  std::vector<Coordinate> joints;
+  for (const Command& command : commands) {
+    for (const Command::Term& term : command.terms) {
+      const bool joint = term.coordinate.kind == Coordinate::Kind::kJoint;
+      if (joint && std::ranges::find(joints, term.coordinate) == joints.end()) {
+        joints.push_back(term.coordinate);
+      }
+    }
+  }
+  return joints;
 }
 
 int Motion::FindForce(int drive) const {

@@ -36,11 +36,13 @@ struct Coordinate {
     kPrescribed,  ///< index into Mechanism::prescribed
     kDrive,       ///< index into Mechanism::drives
     kOutput,      ///< index into Mechanism::outputs, component 0…5 = x, y, z, roll, pitch, yaw
-    kJoint,       ///< index into Mechanism::joints, component: its coordinate; start values only
+    kJoint,       ///< index into Mechanism::joints, component: its coordinate
   };
   Kind kind = Kind::kDrive;
   int index = 0;
   int component = 0;
+
+  bool operator==(const Coordinate&) const = default;
 };
 
 /// True when it is a length (else it is an angle).
@@ -56,6 +58,10 @@ struct NamedCoordinate {
 };
 /// What a command may name: prescribed joints, drives, OUTPUT.x … OUTPUT.yaw.
 [[nodiscard]] std::vector<NamedCoordinate> NamedCommandCoordinates(const Mechanism& mechanism);
+/// The same and, behind them, coordinates of joints as NamedJointCoordinates() calls them, unless
+/// the name is taken or the coordinate is one of a ball's. Where a drive acts on a joint, or its
+/// motion is prescribed, the joint's name stands for that.
+[[nodiscard]] std::vector<NamedCoordinate> NamedMotionCoordinates(const Mechanism& mechanism);
 /// Coordinates of joints: JOINT, or JOINT.0, JOINT.1 … where one has several. Prescribed joints
 /// and drives may have the names of theirs.
 [[nodiscard]] std::vector<NamedCoordinate> NamedJointCoordinates(const Mechanism& mechanism);
@@ -153,6 +159,9 @@ struct Motion {
   [[nodiscard]] int FindForce(int drive) const;
 
   [[nodiscard]] int FindCommand(const std::string& command_name) const;  ///< index or -1
+
+  /// Coordinates of joints without a drive that witnesses record: those that are commanded.
+  [[nodiscard]] std::vector<Coordinate> RecordedJoints() const;
 };
 
 /// A load at one instant; what follows the mechanism's state is not in it.

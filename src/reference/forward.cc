@@ -194,7 +194,7 @@ ForwardRun RunForwardReference(const Mechanism& mechanism, const Motion& motion,
   const auto begin = std::chrono::steady_clock::now();
   ForwardRun run;
   run.trace.witness = role::kReference.name;
-  std::vector<Channel> channels = internal::ReferenceChannels(mechanism, options.reactions);
+  std::vector<Channel> channels = internal::ReferenceChannels(mechanism, motion, options.reactions);
   for (Channel& channel : WorkChannels(mechanism)) channels.push_back(std::move(channel));
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
   run.summary = Integrate(mechanism, motion, options, &run);

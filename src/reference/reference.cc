@@ -11,7 +11,10 @@ namespace mbv {
 
 struct ReferenceSolver::Impl {
   Impl(const Mechanism& m, const Motion& motion, const ReferenceOptions& options)
-      : mechanism(m), closure(m, motion, options), forces(m, motion.duration_s), recorder(m) {}
+      : mechanism(m),
+        closure(m, motion, options),
+        forces(m, motion.duration_s),
+        recorder(m, motion.RecordedJoints()) {}
 
   const Mechanism& mechanism;
   internal::ClosureSolver closure;
@@ -52,7 +55,7 @@ ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
   ReferenceRun run;
   run.trace.witness = role::kReference.name;
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s),
-                  internal::ReferenceChannels(mechanism, options.reactions));
+                  internal::ReferenceChannels(mechanism, motion, options.reactions));
   ReferenceSolver solver(mechanism, motion, options);
   CommandSample command;
   ReferenceSample sample;

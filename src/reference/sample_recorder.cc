@@ -10,9 +10,32 @@
 
 namespace mbv::internal {
 
+SampleRecorder::SampleRecorder(const Mechanism& mechanism, std::vector<Coordinate> joints)
+    : mechanism_(mechanism), joints_(std::move(joints)) {
+  last_joints_.resize(static_cast<Eigen::Index>(joints_.size()));
+  for (Eigen::Index k = 0; k < last_joints_.size(); ++k) {
+    last_joints_[k] = HomeValue(mechanism_, joints_[static_cast<size_t>(k)]);
+  }
+}
+
 void SampleRecorder::Record(ReferenceSample* sample) {
   RecordDriven(sample);
   RecordOutputs(sample);
+  RecordJoints(sample);
+}
+
+void SampleRecorder::RecordJoints(ReferenceSample* sample) {
+  DrivenSample& joints = sample->joints;
+  for (VecX* x : {&joints.position, &joints.velocity, &joints.acceleration}) {
+    x->resize(last_joints_.size());
+  }
+  for (Eigen::Index k = 0; k < last_joints_.size(); ++k) {
+    const ScalarRow row =
+        CoordinateRow(mechanism_, joints_[static_cast<size_t>(k)], sample->states, last_joints_[k]);
+    joints.position[k] = last_joints_[k] = row.value;
+    joints.velocity[k] = RateOf(row, sample->states.V_WB);
+    joints.acceleration[k] = RateOf(row, sample->states.A_WB) + row.bias;
+  }
 }
 
 void SampleRecorder::RecordDriven(ReferenceSample* sample) {
@@ -42,7 +65,8 @@ void SampleRecorder::RecordOutputs(ReferenceSample* sample) {
   sample->outputs = last_outputs_;
 }
 
-std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reactions) {
+std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, const Motion& motion,
+                                       bool reactions) {
   std::vector<Channel> channels = DriveChannels(mechanism);
   const auto append = [&](std::vector<Channel> more) {
     channels.insert(channels.end(), more.begin(), more.end());
@@ -55,6 +79,9 @@ std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reaction
   }
   append(AuditChannels());
   append(EnergyChannels());
+  for (const Coordinate& joint : motion.RecordedJoints()) {
+    append(JointChannels(mechanism, joint, true));
+  }
   return channels;
 }
 
@@ -105,6 +132,11 @@ void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
     put(Quantity::kForce, d, sample.drive_force[d]);
   }
   put_rows(Quantity::kPose, sample.outputs);
+  for (Eigen::Index k = 0; k < sample.joints.position.size(); ++k) {
+    put(Quantity::kJointPosition, k, sample.joints.position[k]);
+    put(Quantity::kJointVelocity, k, sample.joints.velocity[k]);
+    put(Quantity::kJointAcceleration, k, sample.joints.acceleration[k]);
+  }
   for (Eigen::Index p = 0; p < sample.prescribed_force.size(); ++p) {
     put(Quantity::kBaseForce, p, sample.prescribed_force[p]);
   }

@@ -11,26 +11,32 @@
 
 namespace mbv::internal {
 
-/// Reads drives, prescribed joints and outputs from body states. Drives and prescribed joints count
-/// the rotations that the states count; of an output's angles the last sample says which turn they
-/// are in.
+/// Reads drives, prescribed joints, outputs and recorded joints from body states. Drives and
+/// prescribed joints count the rotations that the states count; of other angles the last sample
+/// says which turn they are in.
 class SampleRecorder {
  public:
-  explicit SampleRecorder(const Mechanism& mechanism) : mechanism_(mechanism) {}
+  /// `joints`: Motion::RecordedJoints().
+  explicit SampleRecorder(const Mechanism& mechanism, std::vector<Coordinate> joints = {});
 
-  /// Fills `driven` and `outputs` of a sample from its states.
+  /// Fills `driven`, `outputs` and `joints` of a sample from its states.
   void Record(ReferenceSample* sample);
   void RecordDriven(ReferenceSample* sample);
   /// Their angles are followed from one call to the next.
   void RecordOutputs(ReferenceSample* sample);
 
  private:
+  void RecordJoints(ReferenceSample* sample);
+
   const Mechanism& mechanism_;
+  const std::vector<Coordinate> joints_;
   MatX last_outputs_;
+  VecX last_joints_;
 };
 
 /// Channels of the reference's traces.
-[[nodiscard]] std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reactions);
+[[nodiscard]] std::vector<Channel> ReferenceChannels(const Mechanism& mechanism,
+                                                     const Motion& motion, bool reactions);
 /// Writes a sample into `row`: every channel of ReferenceChannels() that `columns` has, and the
 /// work if there is any.
 void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,

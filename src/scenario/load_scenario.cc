@@ -16,6 +16,7 @@
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility.h"
 #include "mechanism/channels.h"
+#include "mechanism/followed_state.h"
 #include "mechanism/idle_spins.h"
 #include "model_file/load_model.h"
 #include "model_file/yaml/value_reader.h"
@@ -253,7 +254,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
   // What the witnesses record must fit into memory.
   void CheckSize(const YamlNode& motion) {
     const double samples = scenario_.motion.duration_s / scenario_.motion.sample_s;
-    const auto signals = static_cast<double>(MostChannels(*mechanism_));
+    const auto signals = static_cast<double>(MostChannels(*mechanism_, scenario_.motion));
     if (samples * signals <= kMostValues) return;
     yaml_.Error(motion,
                 fmt::format("{:g} samples of {:g} signals each violate samples · signals <= {:g}",
@@ -317,8 +318,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
       yaml_.Error(motion,
                   fmt::format("motion commands coordinates that depend on each other: {}",
                               JoinWords(DependentNames(rank))),
-                  fmt::format("leave out {} of them; not held yet: {}", rank.redundant,
-                              JoinWords(rank.free_joints)));
+                  fmt::format("leave out {} of them; not held yet: {}; {}", rank.redundant,
+                              JoinWords(rank.free_joints), ChoiceHint(rank)));
     }
   }
 
@@ -346,18 +347,39 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     return hint;
   }
 
+  // An independent set with what the motion commands, drives before outputs before joints.
+  [[nodiscard]] std::string ChoiceHint(const CommandRank& rank) const {
+    std::vector<Coordinate> candidates;
+    for (const Command& command : scenario_.motion.commands) {
+      if (command.terms.size() == 1) candidates.push_back(command.terms.front().coordinate);
+    }
+    for (const NamedCoordinate& named : NamedMotionCoordinates(*mechanism_)) {
+      const bool given = std::ranges::find(candidates, named.coordinate) != candidates.end();
+      if (!given) candidates.push_back(named.coordinate);
+    }
+    std::vector<std::string> names;
+    for (const size_t k : ChooseCoordinates(*mechanism_, candidates, candidates.size()).chosen) {
+      names.push_back(NameOf(*mechanism_, candidates[k]));
+    }
+    return fmt::format("{} independent coordinates move {}, for instance {}", rank.dofs,
+                       mechanism_->name, JoinWords(names));
+  }
+
   [[nodiscard]] std::string CountHint(const CommandRank& rank, bool too_few) const {
     if (too_few) {
-      return "command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives under "
-             "motion.equal; what moves by forces needs motion.initial; not held yet: " +
-             JoinWords(rank.free_joints) + SpinHint();
+      return fmt::format(
+                 "command drives, joints, outputs (OUTPUT.x …), prescribed joints, or couple "
+                 "drives under motion.equal; what moves by forces needs motion.initial; not held "
+                 "yet: {}; {}",
+                 JoinWords(rank.free_joints), ChoiceHint(rank)) +
+             SpinHint();
     }
     std::string hint = "leave commands out: each further one contradicts the others";
     if (!rank.dependent.empty()) hint += "; " + JoinWords(DependentNames(rank)) + " are dependent";
     if (static_cast<int>(mechanism_->drives.size()) > rank.dofs) {
       hint += "; drives that are not commanded share the force by least norm";
     }
-    return hint;
+    return hint + "; " + ChoiceHint(rank);
   }
 };
 

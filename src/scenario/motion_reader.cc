@@ -13,6 +13,7 @@
 #include "kinematics/mobility.h"
 #include "math/channel.h"
 #include "math/spatial.h"
+#include "mechanism/followed_state.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "model_file/yaml/value_reader.h"
@@ -65,7 +66,8 @@ class FreeMotionReader {
   void CheckCommands(const YamlNode& node) {
     for (const Command& command : motion_->commands) {
       const bool plain = command.terms.size() == 1 &&
-                         command.terms[0].coordinate.kind != Coordinate::Kind::kOutput;
+                         command.terms[0].coordinate.kind != Coordinate::Kind::kOutput &&
+                         command.terms[0].coordinate.kind != Coordinate::Kind::kJoint;
       if (plain) continue;
       yaml().Error(
           node,
@@ -398,10 +400,6 @@ namespace {
 
 constexpr double kMostSamples = 1e6;
 
-bool SameCoordinate(const Coordinate& a, const Coordinate& b) {
-  return a.kind == b.kind && a.index == b.index && a.component == b.component;
-}
-
 class MotionReader {
  public:
   MotionReader(ValueReader* values, const Mechanism& mechanism, const MotionTimes& otherwise,
@@ -409,7 +407,7 @@ class MotionReader {
       : values_(values),
         mechanism_(mechanism),
         otherwise_(otherwise),
-        known_(NamedCommandCoordinates(mechanism)),
+        known_(NamedMotionCoordinates(mechanism)),
         tables_{.mechanism = &mechanism, .files = files} {}
 
   Motion Read(const YamlNode* node, const YamlNode* loads, const YamlNode* forces) {
@@ -503,16 +501,39 @@ class MotionReader {
     const std::vector<std::string> names = NamesOf(known_);
     yaml().Error(entry,
                  fmt::format("{}: {} has no coordinate '{}'", path, mechanism_.name, entry.key),
-                 DidYouMean(entry.key, names,
-                            "known: prescribed joints, drives, and OUTPUT.x … OUTPUT.yaw: " +
-                                Joined(names, kMostNames)));
+                 JointHint(entry.key).value_or(DidYouMean(
+                     entry.key, names,
+                     fmt::format("any {} independent ones can be commanded, of prescribed joints, "
+                                 "drives, OUTPUT.x … OUTPUT.yaw and joints (JOINT.0, JOINT.1 … "
+                                 "where they have several coordinates): {}",
+                                 ReportMobility(mechanism_).dofs(), Joined(names, kMostNames)))));
     return {};
+  }
+
+  // What to command where the name is that of a joint, or of a ball's rotation.
+  [[nodiscard]] std::optional<std::string> JointHint(const std::string& name) const {
+    for (const NamedCoordinate& named : NamedJointCoordinates(mechanism_)) {
+      if (named.name != name) continue;
+      return "a rotation of a ball has no axis that a command could be about: command "
+             "OUTPUT.roll, OUTPUT.pitch or OUTPUT.yaw of an output on its body";
+    }
+    const int j = mechanism_.FindJoint(name);
+    if (j < 0) return {};
+    std::vector<std::string> own;
+    for (const NamedCoordinate& named : known_) {
+      const Coordinate& at = named.coordinate;
+      if (named.name.starts_with(name + ".") && at.kind != Coordinate::Kind::kOutput) {
+        own.push_back(named.name);
+      }
+    }
+    if (own.empty()) return "this joint has no coordinate that a command could be about";
+    return fmt::format("this joint has several coordinates: {}", Joined(own));
   }
 
   void AddCommand(const YamlEntry& entry, Command command) {
     for (const Command& other : motion_.commands) {
       const bool same = other.terms.size() == 1 && command.terms.size() == 1 &&
-                        SameCoordinate(other.terms[0].coordinate, command.terms[0].coordinate);
+                        other.terms[0].coordinate == command.terms[0].coordinate;
       if (same || other.name == command.name) {
         yaml().Error(entry, fmt::format("motion commands '{}' twice", command.name));
         return;
@@ -531,7 +552,7 @@ class MotionReader {
                                    .name = entry.key,
                                    .moves = true,
                                    .tables = &tables_};
-      AddCommand(entry, {.name = entry.key,
+      AddCommand(entry, {.name = NameOf(mechanism_, *coordinate),
                          .terms = {{*coordinate, 1.0}},
                          .profile = ReadProfile(values_, *entry.value, path, context)});
     }
@@ -565,8 +586,7 @@ class MotionReader {
       const YamlEntry a = AsEntry(*(*items)[0]), b = AsEntry(*(*items)[1]);
       const auto ca = FindCoordinate(a, path), cb = FindCoordinate(b, path);
       if (!ca || !cb) continue;
-      if (SameCoordinate(*ca, *cb) ||
-          CoordinateUnit(mechanism_, *ca) != CoordinateUnit(mechanism_, *cb)) {
+      if (*ca == *cb || CoordinateUnit(mechanism_, *ca) != CoordinateUnit(mechanism_, *cb)) {
         yaml().Error(*(*pairs)[i], fmt::format("{}: {} and {} are not two coordinates of one unit",
                                                path, a.key, b.key));
         continue;

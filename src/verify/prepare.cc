@@ -4,6 +4,7 @@
 
 #include "base/text.h"
 #include "mechanism/channels.h"
+#include "mechanism/followed_state.h"
 #include "model_file/load_model.h"
 #include "plot/check_figures.h"
 #include "verify/drive_by.h"
@@ -38,6 +39,9 @@ std::vector<Channel> RecordableChannels(const Prepared& prepared) {
   for (const Joint& joint : mechanism.joints) add(ReactionChannels(joint));
   add(AuditChannels());
   add(EnergyChannels());
+  for (const Coordinate& joint : prepared.scenario.motion.RecordedJoints()) {
+    add(JointChannels(mechanism, joint, true));
+  }
   add(WorkChannels(mechanism));
   if (prepared.has_closed_form()) add(prepared.closed_form.closed_form->extra_channels());
   return channels;
@@ -111,6 +115,12 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
       scenario.analytic.stated ? WitnessGap::kNotApplicable : WitnessGap::kNone;
   if (scenario.motion.free()) {
     return {nullptr, "closed forms give forces for a motion, not the motion for forces", asked};
+  }
+  if (const auto joints = scenario.motion.RecordedJoints(); !joints.empty()) {
+    return {nullptr,
+            "closed forms are commanded by drives and outputs, and the motion commands " +
+                NameOf(mechanism, joints.front()),
+            asked};
   }
   const ClosedFormRow* row = FindClosedForm(mechanism.name);
   if (row == nullptr) {

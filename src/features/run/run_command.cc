@@ -36,7 +36,7 @@ std::string WhatIsLarge(const std::string& file, const ScenarioOptions& options)
     if (!loaded.scenario) return "";
     const Motion& motion = loaded.scenario->motion;
     const double samples = motion.duration_s / motion.sample_s;
-    const auto signals = static_cast<double>(MostChannels(*loaded.mechanism));
+    const auto signals = static_cast<double>(MostChannels(*loaded.mechanism, motion));
     const auto bodies = static_cast<double>(loaded.mechanism->bodies.size());
     return fmt::format(
         "{:.0f} samples of {:.0f} signals and {:.0f} poses take about {:.0f} MB for each witness",

@@ -11,12 +11,14 @@
 //   ṗ = R_WRᵀ (v_O − v of the point of R's body at O),  ω = R_WRᵀ (ω_O − ω_R)                 (2)
 //   of R_RO = Rz(ψ) Ry(θ) Rx(φ), e = Rz x, e2 = Rz y:
 //   φ̇ = e·ω / cos θ,  θ̇ = e2·ω,  ψ̇ = ω_z + φ̇ sin θ                                            (3)
+//   of a joint with unit twists S in F's axes, O = M and R = F: [ω; ṗ] = S q̇                  (4)
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "mechanism/joint_pose.h"
 #include "simulation/engine/session.h"
 
 namespace mbv::simulation {
@@ -31,11 +33,16 @@ constexpr double kShortestPart = 1e-4;  // of the way
 // Solutions of the same assembly differ by less, in characteristic lengths.
 constexpr double kSamePlace = 1e-6;
 
-bool CommandsOutputs(const Motion& motion) {
+// Other coordinates are the drives' own.
+bool IsPassive(const Coordinate& coordinate) {
+  return coordinate.kind == Coordinate::Kind::kOutput ||
+         coordinate.kind == Coordinate::Kind::kJoint;
+}
+
+bool CommandsPassive(const Motion& motion) {
   return std::ranges::any_of(motion.commands, [](const Command& command) {
-    return std::ranges::any_of(command.terms, [](const Command::Term& term) {
-      return term.coordinate.kind == Coordinate::Kind::kOutput;
-    });
+    return std::ranges::any_of(
+        command.terms, [](const Command::Term& term) { return IsPassive(term.coordinate); });
   });
 }
 
@@ -53,10 +60,13 @@ class CommandRows {
       }
       const double target = Evaluate(command.profile, 0.0).value;
       targets_.push_back(target);
-      // The turn of an angle is the command's.
+      // The turn of an output's angle is the command's; joints turn from home.
       const bool alone = command.terms.size() == 1;
       for (const Command::Term& term : command.terms) {
-        near_.push_back(alone ? target / term.factor : 0.0);
+        const bool joint = term.coordinate.kind == Coordinate::Kind::kJoint;
+        near_.push_back(joint   ? HomeValue(*engine_.mechanism, term.coordinate)
+                        : alone ? target / term.factor
+                                : 0.0);
       }
     }
     for (size_t p = 0; p < commanded.size(); ++p) {
@@ -97,7 +107,7 @@ class CommandRows {
       bool angle = false;
       for (const Command::Term& term : command.terms) {
         const Value value = ValueOf(term.coordinate, near_[term_index]);
-        if (term.coordinate.kind == Coordinate::Kind::kOutput) near_[term_index] = value.position;
+        if (IsPassive(term.coordinate)) near_[term_index] = value.position;
         ++term_index;
         residual_[row] += term.factor * value.position;
         J_.row(row) += term.factor * value.gradient.transpose();
@@ -170,18 +180,23 @@ class CommandRows {
     return rates;
   }
 
+  // [ω; ṗ] of frame O of a body against frame R of another, in R's axes, by the velocities: (2).
+  RowMajor RelativeRates(int reference_body, const Pose& X_WR, int body, const Pose& X_WO) const {
+    const FrameRates of = RatesOf(body, X_WO.translation());
+    const FrameRates from = RatesOf(reference_body, X_WO.translation());
+    const Mat3 R_RW = X_WR.linear().transpose();
+    RowMajor J(6, of.J_v.cols());
+    J << R_RW * (of.J_w - from.J_w), R_RW * (of.J_v - from.J_v);
+    return J;
+  }
+
   // (2), (3)
   Value OutputValue(const Output& output, int component, double near) const {
     const Pose X_WR = X_WB_[static_cast<size_t>(output.reference_body)] * output.X_RbR;
     const Pose X_WO = X_WB_[static_cast<size_t>(output.body)] * output.X_BO;
     const Pose X_RO = X_WR.inverse() * X_WO;
-    const FrameRates of = RatesOf(output.body, X_WO.translation());
-    const FrameRates from = RatesOf(output.reference_body, X_WO.translation());
-    const Mat3 R_RW = X_WR.linear().transpose();
-    if (component < 3) {
-      return {X_RO.translation()[component],
-              (R_RW.row(component) * (of.J_v - from.J_v)).transpose()};
-    }
+    const RowMajor J = RelativeRates(output.reference_body, X_WR, output.body, X_WO);
+    if (component < 3) return {X_RO.translation()[component], J.row(3 + component).transpose()};
     const Mat3 R = X_RO.linear();
     const double cosine = std::hypot(R(0, 0), R(1, 0)), sine = -R(2, 0);
     const Vec3 e(R(0, 0) / cosine, R(1, 0) / cosine, 0.0), e2 = Vec3::UnitZ().cross(e);
@@ -191,7 +206,22 @@ class CommandRows {
                          : component == 4 ? std::atan2(sine, cosine)
                                           : std::atan2(R(1, 0), R(0, 0));
     return {near + std::remainder(angle - near, 2.0 * std::numbers::pi),
-            (axis.transpose() * R_RW * (of.J_w - from.J_w)).transpose()};
+            (axis.transpose() * J.topRows<3>()).transpose()};
+  }
+
+  // (4)
+  Value JointValue(const Joint& joint, int coordinate, double near) const {
+    const Pose X_WF = X_WB_[static_cast<size_t>(joint.parent)] * joint.X_PF;
+    const Pose X_WM = X_WB_[static_cast<size_t>(joint.child)] * joint.X_CM;
+    const Pose X_FM = X_WF.inverse() * X_WM;
+    const RowMajor J = RelativeRates(joint.parent, X_WF, joint.child, X_WM);
+    const JointTwists S = UnitTwists(joint, Mat3::Identity(), X_FM.linear());
+    const MatX rates = S.colPivHouseholderQr().solve(MatX(J));
+    double position = CoordinatesOf(joint, X_FM)[static_cast<size_t>(coordinate)];
+    if (!IsLength(joint.kind, coordinate)) {
+      position = near + std::remainder(position - near, 2.0 * std::numbers::pi);
+    }
+    return {position, rates.row(coordinate).transpose()};
   }
 
   Value ValueOf(const Coordinate& coordinate, double near) const {
@@ -199,6 +229,10 @@ class CommandRows {
     if (coordinate.kind == Coordinate::Kind::kOutput) {
       return OutputValue(mechanism.outputs[static_cast<size_t>(coordinate.index)],
                          coordinate.component, near);
+    }
+    if (coordinate.kind == Coordinate::Kind::kJoint) {
+      return JointValue(mechanism.joints[static_cast<size_t>(coordinate.index)],
+                        coordinate.component, near);
     }
     const bool base = coordinate.kind == Coordinate::Kind::kPrescribed;
     const int k = coordinate.index + (base ? static_cast<int>(mechanism.drives.size()) : 0);
@@ -328,7 +362,7 @@ std::string WhereDrivesLead(const std::vector<Vec3>& places, const DrivenSample&
 RunSummary CloseAtStart(const Motion& motion, const DrivenSample& first, ConstraintSystem* system,
                         ClosureSolver* solver, std::vector<std::string>* notes) {
   const VecX home = HomePositions(system->engine());
-  if (!CommandsOutputs(motion)) return solver->Follow(home, first.position);
+  if (!CommandsPassive(motion)) return solver->Follow(home, first.position);
   CommandWalk walk(motion, system);
   if (!walk.Arrive()) return solver->Follow(home, first.position);
   if (RunSummary summary = solver->Follow(walk.DrivenPositions(), first.position); !summary.ok()) {
@@ -339,7 +373,7 @@ RunSummary CloseAtStart(const Motion& motion, const DrivenSample& first, Constra
   const std::string elsewhere = WhereDrivesLead(JointPlaces(*system), first, system, solver);
   if (!elsewhere.empty()) {
     notes->push_back(
-        "the simulation starts in the assembly to which the commanded outputs lead "
+        "the simulation starts in the assembly to which the commanded coordinates lead "
         "from home; " +
         elsewhere);
   }

@@ -6,6 +6,7 @@
 #include "base/demand.h"
 #include "math/spatial.h"
 #include "mechanism/channels.h"
+#include "mechanism/joint_pose.h"
 #include "simulation/engine/element_forces.h"
 
 namespace mbv::simulation {
@@ -189,23 +190,62 @@ bool HasOutputRates(const EngineModel& engine, const Output& output) {
   return engine.PlannedOf(output.body) >= 0 && engine.PlannedOf(output.reference_body) >= 0;
 }
 
-OutputRates OutputRatesOf(const EngineModel& engine, const mjData& d, const Output& output) {
-  const Place o = PlaceOf(engine, d, output.body, output.X_BO.translation());
-  const Place f = PlaceOf(engine, d, output.reference_body, output.X_RbR.translation());
-  const auto rotation = [&](int body) {
-    return Mat3(PoseOf(d, engine.body_id[engine.PlannedOf(body)]).linear());
+bool HasJointRates(const EngineModel& engine, const Joint& joint) {
+  return engine.PlannedOf(joint.child) >= 0 && engine.PlannedOf(joint.parent) >= 0;
+}
+
+namespace {
+
+// How frame O of a body moves against frame R of another, (1) to (3) in R's axes.
+struct Relative {
+  Mat3 R_RO;
+  Vec3 v, a, w, alpha;
+};
+
+Relative RelativeOf(const EngineModel& engine, const mjData& d, int reference_body,
+                    const Pose& X_BR, int body, const Pose& X_BO) {
+  const Place o = PlaceOf(engine, d, body, X_BO.translation());
+  const Place f = PlaceOf(engine, d, reference_body, X_BR.translation());
+  const auto rotation = [&](int of) {
+    return Mat3(PoseOf(d, engine.body_id[engine.PlannedOf(of)]).linear());
   };
-  const Mat3 R_WR = rotation(output.reference_body) * output.X_RbR.linear();
-  const Mat3 R_RO = R_WR.transpose() * rotation(output.body) * output.X_BO.linear();
+  const Mat3 R_RW = (rotation(reference_body) * X_BR.linear()).transpose();
   const Vec3 r = o.p - f.p, w = o.w - f.w;
   const Vec3 v = o.v - f.v - f.w.cross(r);
   const Vec3 a = o.a - f.a - f.alpha.cross(r) - f.w.cross(f.w.cross(r)) - 2.0 * f.w.cross(v);
   const Vec3 alpha = o.alpha - f.alpha - f.w.cross(w);
+  return {.R_RO = R_RW * rotation(body) * X_BO.linear(),
+          .v = R_RW * v,
+          .a = R_RW * a,
+          .w = R_RW * w,
+          .alpha = R_RW * alpha};
+}
+
+}  // namespace
+
+OutputRates OutputRatesOf(const EngineModel& engine, const mjData& d, const Output& output) {
+  const Relative motion =
+      RelativeOf(engine, d, output.reference_body, output.X_RbR, output.body, output.X_BO);
   OutputRates rates;
-  rates.velocity.head<3>() = R_WR.transpose() * v;
-  rates.acceleration.head<3>() = R_WR.transpose() * a;
-  PutAngles(R_RO, R_WR.transpose() * w, R_WR.transpose() * alpha, &rates);
+  rates.velocity.head<3>() = motion.v;
+  rates.acceleration.head<3>() = motion.a;
+  PutAngles(motion.R_RO, motion.w, motion.alpha, &rates);
   return rates;
+}
+
+// With S the joint's unit twists in F's axes, [ω; v] = S q̇ and [α; a] = S q̈ + b. What the joint may
+// do along and about axes that are fixed in F or M has b = 0; the second axis of a universal joint
+// turns about the first, b = q̇1 q̇2 axis × axis2, which is square to both: least squares of both
+// equations give q̇ and q̈.                                                                       (7)
+CoordinateRates JointRatesOf(const EngineModel& engine, const mjData& d, const Joint& joint,
+                             int coordinate) {
+  const Relative motion = RelativeOf(engine, d, joint.parent, joint.X_PF, joint.child, joint.X_CM);
+  const JointTwists S = UnitTwists(joint, Mat3::Identity(), motion.R_RO);
+  const Eigen::ColPivHouseholderQR<JointTwists> qr(S);
+  Vec6 V, A;
+  V << motion.w, motion.v;
+  A << motion.alpha, motion.a;
+  return {VecX(qr.solve(V))[coordinate], VecX(qr.solve(A))[coordinate]};
 }
 
 namespace {
@@ -235,12 +275,17 @@ std::vector<Channel> Recorder::MakeChannels(bool work) {
     rated_.push_back(&output);
     Append(OutputRateChannels(mechanism, output), &channels);
   }
+  for (const Coordinate& at : joints_) {
+    const Joint& joint = mechanism.joints[static_cast<size_t>(at.index)];
+    Append(JointChannels(mechanism, at, HasJointRates(engine_, joint)), &channels);
+  }
   return channels;
 }
 
-Recorder::Recorder(ConstraintSystem* system, bool work)
+Recorder::Recorder(ConstraintSystem* system, std::vector<Coordinate> joints, bool work)
     : system_(system),
       engine_(system->engine()),
+      joints_(std::move(joints)),
       channels_(MakeChannels(work)),
       columns_(channels_) {
   W_.setZero(6, engine_.m->nbody);
@@ -319,6 +364,7 @@ void Recorder::Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::Ro
   RecordOutputs(*X_WB, row);
   RecordReactions(loads, *X_WB, row);
   RecordOutputRates(row);
+  RecordJoints(*X_WB, row);
   RecordAudit(loads, work, row);
 }
 
@@ -370,6 +416,23 @@ void Recorder::RecordOutputRates(Eigen::Ref<Eigen::RowVectorXd> row) const {
     const OutputRates rates = OutputRatesOf(engine_, *system_->data(), *rated_[i]);
     row.segment<6>(columns_(Quantity::kPoseVelocity, 6 * i)) = rates.velocity.transpose();
     row.segment<6>(columns_(Quantity::kPoseAcceleration, 6 * i)) = rates.acceleration.transpose();
+  }
+}
+
+void Recorder::RecordJoints(const std::vector<Pose>& X_WB,
+                            Eigen::Ref<Eigen::RowVectorXd> row) const {
+  size_t rated = 0;
+  for (size_t k = 0; k < joints_.size(); ++k) {
+    const Joint& joint = engine_.mechanism->joints[static_cast<size_t>(joints_[k].index)];
+    const auto c = static_cast<size_t>(joints_[k].component);
+    const Pose X_FM =
+        (X_WB[joint.parent] * joint.X_PF).inverse(Eigen::Isometry) * X_WB[joint.child] * joint.X_CM;
+    row[columns_(Quantity::kJointPosition, k)] = CoordinatesOf(joint, X_FM)[c];
+    if (!HasJointRates(engine_, joint)) continue;
+    const CoordinateRates rates =
+        JointRatesOf(engine_, *system_->data(), joint, joints_[k].component);
+    row[columns_(Quantity::kJointVelocity, rated)] = rates.velocity;
+    row[columns_(Quantity::kJointAcceleration, rated++)] = rates.acceleration;
   }
 }
 

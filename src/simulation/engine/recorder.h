@@ -68,18 +68,28 @@ struct OutputRates {
 
 /// False if one of the output's two bodies was merged into another one.
 [[nodiscard]] bool HasOutputRates(const EngineModel& engine, const Output& output);
+/// The same of a joint's bodies.
+[[nodiscard]] bool HasJointRates(const EngineModel& engine, const Joint& joint);
 
 /// Expects positions, mj_comVel and mj_rnePostConstraint (cacc) of one instant in `d`.
 [[nodiscard]] OutputRates OutputRatesOf(const EngineModel& engine, const mjData& d,
                                         const Output& output);
+
+/// Rate and acceleration of a joint's coordinate, which is none of a ball's.
+struct CoordinateRates {
+  double velocity = kNan, acceleration = kNan;
+};
+/// From how the joint's two bodies move, as OutputRatesOf().
+[[nodiscard]] CoordinateRates JointRatesOf(const EngineModel& engine, const mjData& d,
+                                           const Joint& joint, int coordinate);
 
 /// Expects positions, velocities (mj_comVel), accelerations qacc, body forces
 /// (ConstraintSystem::EvaluateBodyForces()) and constraint forces efc_force of one and the same
 /// instant in the system's data.
 class Recorder {
  public:
-  /// `work`: with WorkChannels().
-  Recorder(ConstraintSystem* system, bool work);
+  /// `joints`: Motion::RecordedJoints(). `work`: with WorkChannels().
+  Recorder(ConstraintSystem* system, std::vector<Coordinate> joints, bool work);
 
   [[nodiscard]] std::vector<Channel> channels() const { return channels_; }
 
@@ -112,6 +122,7 @@ class Recorder {
   void RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row);
   void RecordOutputs(const std::vector<Pose>& X_WB, Eigen::Ref<Eigen::RowVectorXd> row) const;
   void RecordOutputRates(Eigen::Ref<Eigen::RowVectorXd> row) const;
+  void RecordJoints(const std::vector<Pose>& X_WB, Eigen::Ref<Eigen::RowVectorXd> row) const;
   void RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
                        Eigen::Ref<Eigen::RowVectorXd> row);
   void RecordAudit(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row);
@@ -128,6 +139,7 @@ class Recorder {
   ConstraintSystem* const system_;
   const EngineModel& engine_;
   std::vector<const Output*> rated_;  // outputs whose rates MuJoCo's bodies give
+  const std::vector<Coordinate> joints_;
   const std::vector<Channel> channels_;
   const ChannelColumns columns_;
   std::vector<ReactionPlace> places_;  // per joint

@@ -54,7 +54,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       solver(&system),
       spins(&system),
       loads(engine, motion_),
-      recorder(&system, Integrates(options_)),
+      recorder(&system, motion_.RecordedJoints(), Integrates(options_)),
       released(motion_.free() || IsReleased(engine)),
       loaded(LoadedElements(*engine.mechanism)),
       lacking(HasLacking(*engine.mechanism)),
