@@ -128,8 +128,8 @@ TEST(DriveMotion, TheVerdictSaysWhoseMotionIsFollowed) {
 // README and documents deny nothing: the same sentence stands in each.
 TEST(DriveMotion, TheDocumentsSayTheSame) {
   const std::string sentence =
-      "ommanded in task space, the simulation follows the drive positions, rates and accelerations "
-      "that the closed form (else the reference) computes";
+      "ommanded in task space or by passive joints, the simulation follows the drive positions, "
+      "rates and accelerations that the closed form (else the reference) computes";
   for (const char* file :
        {"README.md", "docs/development/architecture.md", "docs/explanation/simulation.md"}) {
     std::ifstream stream(SourcePath(std::string("/") + file));

@@ -22,10 +22,14 @@ TEST(Channel, EachQuantityHasItsName) {
   std::set<std::string> names;
   for (int q = 1; q < static_cast<int>(Quantity::kCount_); ++q) {
     const auto quantity = static_cast<Quantity>(q);
-    // Drives and prescribed joints share words and never a name.
+    // Drives, prescribed joints and coordinates of joints share words and never a name.
     const bool base = quantity == Quantity::kBaseForce || quantity == Quantity::kBaseForceBand ||
                       quantity == Quantity::kBaseWork;
-    EXPECT_TRUE(names.insert(ChannelName(quantity, base ? "base" : "one", 0)).second) << q;
+    const bool joint = quantity == Quantity::kJointPosition ||
+                       quantity == Quantity::kJointVelocity ||
+                       quantity == Quantity::kJointAcceleration;
+    const std::string subject = base ? "base" : joint ? "joint" : "one";
+    EXPECT_TRUE(names.insert(ChannelName(quantity, subject, 0)).second) << q;
   }
 }
 
