@@ -170,27 +170,39 @@ PolynomialJet PolynomialAt(const std::vector<double>& coefficients, double q) {
 }
 
 // `near`: per term a value within half a turn.
-CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling, const BodyStates& states,
-                  const double* near) {
-  CouplingRow out;
-  out.value = coupling.constant;
+void FillRow(const Mechanism& mechanism, const Coupling& coupling, const BodyStates& states,
+             const double* near, CouplingRow* out) {
+  out->pieces.clear();
+  out->coordinates.clear();
+  out->angular = true;
+  out->value = coupling.constant;
   for (const Coupling::Term& term : coupling.terms) {
     const Joint& joint = mechanism.joints[term.joint];
     ScalarRow row = JointCoordinateRow(joint, term.coordinate, states,
                                        near == nullptr ? joint.home[term.coordinate] : *near++);
     const double rate = RateOf(row, states.V_WB);
     const PolynomialJet P = PolynomialAt(term.polynomial, row.value);
-    out.coordinates.push_back(row.value);
+    out->coordinates.push_back(row.value);
     row.value = P.value;
     row.bias = P.slope * row.bias + P.curvature * rate * rate;
     row.J_parent *= P.slope;
     row.J_child *= P.slope;
-    out.value += row.value;
-    out.angular = out.angular && !IsLength(joint.kind, term.coordinate);
-    out.pieces.push_back(row);
+    out->value += row.value;
+    out->angular = out->angular && !IsLength(joint.kind, term.coordinate);
+    out->pieces.push_back(row);
   }
-  if (!out.pieces.empty()) out.pieces.front().value += coupling.constant;
-  return out;
+  if (!out->pieces.empty()) out->pieces.front().value += coupling.constant;
+}
+
+void FillRows(const Mechanism& mechanism, const BodyStates& states,
+              std::vector<CouplingRow>* rows) {
+  rows->resize(mechanism.couplings.size());
+  const double* near = states.coupled.empty() ? nullptr : states.coupled.data();
+  for (size_t c = 0; c < rows->size(); ++c) {
+    const Coupling& coupling = mechanism.couplings[c];
+    FillRow(mechanism, coupling, states, near, &(*rows)[c]);
+    if (near != nullptr) near += coupling.terms.size();
+  }
 }
 
 }  // namespace
@@ -203,34 +215,22 @@ double CouplingRow::LargestPiece() const {
 
 std::vector<CouplingRow> CouplingRows(const Mechanism& mechanism, const BodyStates& states) {
   std::vector<CouplingRow> rows;
-  const double* near = states.coupled.empty() ? nullptr : states.coupled.data();
-  for (const Coupling& coupling : mechanism.couplings) {
-    rows.push_back(RowOf(mechanism, coupling, states, near));
-    if (near != nullptr) near += coupling.terms.size();
-  }
+  FillRows(mechanism, states, &rows);
   return rows;
 }
 
-std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states) {
-  std::vector<CouplingRow> rows = CouplingRows(mechanism, *states);
+void FollowCouplings(const Mechanism& mechanism, BodyStates* states,
+                     std::vector<CouplingRow>* rows) {
+  FillRows(mechanism, *states, rows);
   states->coupled.clear();
-  for (const CouplingRow& row : rows) {
+  for (const CouplingRow& row : *rows) {
     states->coupled.insert(states->coupled.end(), row.coordinates.begin(), row.coordinates.end());
   }
-  return rows;
 }
 
-std::vector<ScalarRow> CoupledCoordinates(const Mechanism& mechanism, const BodyStates& states) {
-  std::vector<ScalarRow> rows;
-  for (const Coupling& coupling : mechanism.couplings) {
-    for (const Coupling::Term& term : coupling.terms) {
-      const Joint& joint = mechanism.joints[term.joint];
-      const double near =
-          states.coupled.empty() ? joint.home[term.coordinate] : states.coupled[rows.size()];
-      rows.push_back(JointCoordinateRow(joint, term.coordinate, states, near));
-    }
-  }
-  return rows;
+void FollowCouplings(const Mechanism& mechanism, BodyStates* states) {
+  std::vector<CouplingRow> rows;
+  FollowCouplings(mechanism, states, &rows);
 }
 
 std::vector<double> CoupledGuesses(const Mechanism& mechanism) {
@@ -297,31 +297,14 @@ std::string CoupledJoints(const Mechanism& mechanism, const Coupling& coupling) 
 
 namespace {
 
-ScalarRow RowOf(const Mechanism& mechanism, const ForceElement& element, const BodyStates& states,
-                const double* near) {
-  if (element.drive >= 0) {
-    return DriveRow(mechanism, mechanism.drives[static_cast<size_t>(element.drive)], states);
-  }
-  if (element.bushing >= 0) {
-    return BushingRow(mechanism.bushings[static_cast<size_t>(element.bushing)], element.coordinate,
-                      states);
-  }
-  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
-  const auto k = static_cast<size_t>(element.coordinate);
-  return JointCoordinateRow(joint, element.coordinate, states,
-                            near == nullptr ? joint.home[k] : *near);
-}
-
 // Drives, then prescribed joints.
-std::vector<Coordinate> Driven(const Mechanism& mechanism) {
-  std::vector<Coordinate> driven;
-  for (size_t k = 0; k < mechanism.drives.size(); ++k) {
-    driven.push_back({Coordinate::Kind::kDrive, static_cast<int>(k), 0});
-  }
-  for (size_t k = 0; k < mechanism.prescribed.size(); ++k) {
-    driven.push_back({Coordinate::Kind::kPrescribed, static_cast<int>(k), 0});
-  }
-  return driven;
+size_t CountDriven(const Mechanism& mechanism) {
+  return mechanism.drives.size() + mechanism.prescribed.size();
+}
+Coordinate Driven(const Mechanism& mechanism, size_t k) {
+  const size_t drives = mechanism.drives.size();
+  if (k < drives) return {Coordinate::Kind::kDrive, static_cast<int>(k), 0};
+  return {Coordinate::Kind::kPrescribed, static_cast<int>(k - drives), 0};
 }
 
 // Where nothing was followed yet, the poses lie within half a turn of home.
@@ -331,24 +314,10 @@ std::vector<double>* TurnsOf(const Mechanism& mechanism, BodyStates* states) {
     const Coordinate on{Coordinate::Kind::kJoint, element.joint, element.coordinate};
     states->turns.push_back(element.joint < 0 ? 0.0 : HomeValue(mechanism, on));
   }
-  for (const Coordinate& driven : Driven(mechanism)) {
-    states->turns.push_back(HomeValue(mechanism, driven));
+  for (size_t k = 0; k < CountDriven(mechanism); ++k) {
+    states->turns.push_back(HomeValue(mechanism, Driven(mechanism, k)));
   }
   return &states->turns;
-}
-
-ScalarRow DrivenRow(const Mechanism& mechanism, const Coordinate& driven, const BodyStates& states,
-                    double near) {
-  const auto k = static_cast<size_t>(driven.index);
-  if (driven.kind == Coordinate::Kind::kDrive) {
-    return DriveRow(mechanism, mechanism.drives[k], states, near);
-  }
-  const Joint& joint = mechanism.joints[static_cast<size_t>(mechanism.prescribed[k].joint)];
-  return JointCoordinateRow(joint, 0, states, near);
-}
-
-void Put(const std::vector<ScalarRow>& rows, size_t first, std::vector<double>* turns) {
-  for (size_t k = 0; k < rows.size(); ++k) (*turns)[first + k] = rows[k].value;
 }
 
 // c + ċ Δt + c̈ Δt²/2
@@ -359,48 +328,72 @@ double Later(const ScalarRow& row, const BodyStates& states, double dt_s) {
 
 }  // namespace
 
+ScalarRow ElementRow(const Mechanism& mechanism, size_t e, const BodyStates& states) {
+  const ForceElement& element = mechanism.elements[e];
+  if (element.drive >= 0) {
+    return DriveRow(mechanism, mechanism.drives[static_cast<size_t>(element.drive)], states);
+  }
+  if (element.bushing >= 0) {
+    return BushingRow(mechanism.bushings[static_cast<size_t>(element.bushing)], element.coordinate,
+                      states);
+  }
+  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  const double near =
+      states.turns.empty() ? joint.home[static_cast<size_t>(element.coordinate)] : states.turns[e];
+  return JointCoordinateRow(joint, element.coordinate, states, near);
+}
+
 std::vector<ScalarRow> ElementRows(const Mechanism& mechanism, const BodyStates& states) {
   std::vector<ScalarRow> rows;
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
-    rows.push_back(RowOf(mechanism, mechanism.elements[e], states,
-                         states.turns.empty() ? nullptr : &states.turns[e]));
+    rows.push_back(ElementRow(mechanism, e, states));
   }
   return rows;
 }
 
-std::vector<ScalarRow> DrivenRows(const Mechanism& mechanism, const BodyStates& states) {
-  std::vector<ScalarRow> rows;
-  for (const Coordinate& driven : Driven(mechanism)) {
-    const size_t k = mechanism.elements.size() + rows.size();
-    const double near = states.turns.empty() ? HomeValue(mechanism, driven) : states.turns[k];
-    rows.push_back(DrivenRow(mechanism, driven, states, near));
-  }
-  return rows;
+ScalarRow DrivenRow(const Mechanism& mechanism, size_t k, const BodyStates& states) {
+  const Coordinate driven = Driven(mechanism, k);
+  const double near = states.turns.empty() ? HomeValue(mechanism, driven)
+                                           : states.turns[mechanism.elements.size() + k];
+  return CoordinateRow(mechanism, driven, states, near);
 }
 
 void FollowElements(const Mechanism& mechanism, BodyStates* states) {
   if (mechanism.elements.empty()) return;
-  Put(ElementRows(mechanism, *states), 0, TurnsOf(mechanism, states));
+  std::vector<double>& turns = *TurnsOf(mechanism, states);
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
+    turns[e] = ElementRow(mechanism, e, *states).value;
+  }
 }
 
 void FollowDriven(const Mechanism& mechanism, BodyStates* states) {
-  Put(DrivenRows(mechanism, *states), mechanism.elements.size(), TurnsOf(mechanism, states));
+  double* turns = TurnsOf(mechanism, states)->data() + mechanism.elements.size();
+  for (size_t k = 0; k < CountDriven(mechanism); ++k) {
+    turns[k] = DrivenRow(mechanism, k, *states).value;
+  }
 }
 
 void PredictTurns(const Mechanism& mechanism, double dt_s, BodyStates* states) {
-  std::vector<double> turns, coupled;
-  for (auto* rows_of : {&ElementRows, &DrivenRows}) {
-    for (const ScalarRow& row : rows_of(mechanism, *states)) {
-      turns.push_back(Later(row, *states, dt_s));
+  std::vector<double>& turns = *TurnsOf(mechanism, states);
+  const size_t elements = mechanism.elements.size();
+  for (size_t e = 0; e < elements; ++e) {
+    turns[e] = Later(ElementRow(mechanism, e, *states), *states, dt_s);
+  }
+  for (size_t k = 0; k < CountDriven(mechanism); ++k) {
+    turns[elements + k] = Later(DrivenRow(mechanism, k, *states), *states, dt_s);
+  }
+  std::vector<double>& coupled = states->coupled;
+  const bool at_home = coupled.empty();
+  size_t at = 0;
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) {
+      const Joint& joint = mechanism.joints[term.joint];
+      if (at_home) coupled.push_back(joint.home[term.coordinate]);
+      coupled[at] =
+          Later(JointCoordinateRow(joint, term.coordinate, *states, coupled[at]), *states, dt_s);
+      ++at;
     }
   }
-  for (const ScalarRow& row : CoupledCoordinates(mechanism, *states)) {
-    coupled.push_back(Later(row, *states, dt_s));
-  }
-  // What follows is that of loads (state_loads.h).
-  if (states->turns.size() < turns.size()) states->turns.resize(turns.size());
-  std::ranges::copy(turns, states->turns.begin());
-  states->coupled = std::move(coupled);
 }
 
 namespace {

@@ -87,11 +87,9 @@ struct CouplingRow {
 
 /// The same, and brings `states->coupled` to the poses, which lie within half a turn of those it
 /// was last brought to (or of home).
-std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states);
-
-/// The coordinate of every term of every coupling, in the rotations that `states.coupled` counts.
-[[nodiscard]] std::vector<ScalarRow> CoupledCoordinates(const Mechanism& mechanism,
-                                                        const BodyStates& states);
+void FollowCouplings(const Mechanism& mechanism, BodyStates* states,
+                     std::vector<CouplingRow>* rows);
+void FollowCouplings(const Mechanism& mechanism, BodyStates* states);
 
 /// How many turns the coupled coordinates count at the joints' guesses, for poses near them.
 [[nodiscard]] std::vector<double> CoupledGuesses(const Mechanism& mechanism);
@@ -112,9 +110,11 @@ void SolveFollowers(const Mechanism& mechanism, CoordinateSet* known,
 /// with velocities for the bias.
 [[nodiscard]] std::vector<ScalarRow> ElementRows(const Mechanism& mechanism,
                                                  const BodyStates& states);
+[[nodiscard]] ScalarRow ElementRow(const Mechanism& mechanism, size_t element,
+                                   const BodyStates& states);
 /// The same of drives, then of prescribed joints.
-[[nodiscard]] std::vector<ScalarRow> DrivenRows(const Mechanism& mechanism,
-                                                const BodyStates& states);
+[[nodiscard]] ScalarRow DrivenRow(const Mechanism& mechanism, size_t driven,
+                                  const BodyStates& states);
 
 /// Brings the elements' part of `states->turns` to the poses, which lie within half a turn of those
 /// it was last brought to (or of home).

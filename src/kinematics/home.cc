@@ -94,7 +94,7 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
     std::vector<double> coupled = std::move(at->states.coupled);
     at->states = tree.States(at->X_FM);
     at->states.coupled = std::move(coupled);
-    (void)FollowCouplings(mechanism, &at->states);
+    FollowCouplings(mechanism, &at->states);
     MatX J_q;
     VecX r = ClosureResidual(mechanism, tree, at->states, length, &J_q);
     *J = J_q * unit.asDiagonal();

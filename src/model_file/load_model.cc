@@ -780,6 +780,12 @@ bool IsRobotFile(const std::string& file) {
                              [&](const char* ending) { return file.ends_with(ending); });
 }
 
+std::string CompletedModel(const std::string& file) {
+  std::string companion = internal::IsUrdfFile(file) ? UrdfCompanionPath(file) : "";
+  std::error_code error;
+  return std::filesystem::is_regular_file(companion, error) ? companion : file;
+}
+
 std::string XacroHint(const std::string& file) {
   const std::string bare = file.substr(0, file.size() - std::string_view(".xacro").size());
   return fmt::format(

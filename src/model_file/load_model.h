@@ -43,6 +43,9 @@ struct LoadOptions {
 /// Whether a file is a robot of a foreign format (.urdf, .xml, .sdf), by its name, or
 /// becomes one (.xacro).
 [[nodiscard]] bool IsRobotFile(const std::string& file);
+/// The model file that completes a URDF and stands for it, where one lies beside it
+/// (UrdfCompanionPath()); else the file itself.
+[[nodiscard]] std::string CompletedModel(const std::string& file);
 /// "expand it first: xacro X.urdf.xacro > X.urdf", of a file that is to be expanded.
 [[nodiscard]] std::string XacroHint(const std::string& file);
 

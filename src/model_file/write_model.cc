@@ -346,9 +346,12 @@ WrittenNames NamesInModel(const Mechanism& mechanism) {
 }
 
 std::string WriteModel(const Mechanism& mechanism, const std::vector<ModelCaveat>& caveats) {
-  std::string text = ModelWriter(mechanism).Text();
+  return ModelWriter(mechanism).Text() + LeftOutText(caveats);
+}
+
+std::string LeftOutText(const std::vector<ModelCaveat>& caveats) {
   const auto left_out = TextsOf(caveats, ModelCaveat::Kind::kLeftOut);
-  if (!left_out.empty()) text += "left_out:\n";
+  std::string text = left_out.empty() ? "" : "left_out:\n";
   for (const std::string& each : left_out) text += "  - " + QuotedYaml(each) + "\n";
   return text;
 }

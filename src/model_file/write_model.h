@@ -21,6 +21,9 @@ namespace mbv {
 [[nodiscard]] std::string WriteModel(const Mechanism& mechanism,
                                      const std::vector<ModelCaveat>& caveats = {});
 
+/// The key that says it; "" where nothing was left out.
+[[nodiscard]] std::string LeftOutText(const std::vector<ModelCaveat>& caveats);
+
 /// A file that a model names.
 struct ModelMeshFile {
   std::string path;  ///< relative to the model's folder: "meshes/arm.stl"

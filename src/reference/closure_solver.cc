@@ -119,7 +119,8 @@ void ClosureSolver::EvaluateRows(Trial* trial, bool biases) {
   }
   first_coupling_ = rows_.size();
   coupled_size_.clear();
-  for (const CouplingRow& row : FollowCouplings(mechanism_, &trial->states)) {
+  FollowCouplings(mechanism_, &trial->states, &coupled_);
+  for (const CouplingRow& row : coupled_) {
     rows_.Add(row);
     coupled_size_.push_back(row.LargestPiece());
   }
@@ -130,25 +131,21 @@ void ClosureSolver::EvaluateRows(Trial* trial, bool biases) {
   for (const Spin& spin : spins_) rows_.Add(IdleRow(spin, trial->states), true);
 }
 
-VecX ClosureSolver::Residual(const VecX& target) const {
-  VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
-  r.tail(target.size()) -= target;
-  return r;
-}
-
-double ClosureSolver::Openness(const VecX& residual, const VecX& target,
-                               const std::vector<Pose>& X_WB) const {
+double ClosureSolver::Openness(const VecX& target, const std::vector<Pose>& X_WB) {
+  missing_.resize(system_.size());
   const double closed_m = std::max(options_.closure_tolerance_m * length_, Rounding(X_WB));
   double openness = 0.0;
   for (int k = 0; k < system_.size(); ++k) {
     const int row = selection_[k];
+    const double asked = row < joint_rows_ ? 0.0 : target[row - joint_rows_];
     const double coordinate = row < first_coupling_ ? 0.0
                               : row < joint_rows_   ? coupled_size_[row - first_coupling_]
-                                                    : std::abs(target[row - joint_rows_]);
+                                                    : std::abs(asked);
     // Angles count turns, and both they and lengths may be large beside the mechanism.
     const double tolerance = std::max(rows_.angular[row] ? options_.closure_tolerance_m : closed_m,
                                       32 * kEps * coordinate);
-    const double open = std::abs(residual[k]) / tolerance;
+    missing_[k] = asked - rows_.value[row];
+    const double open = std::abs(missing_[k]) / tolerance;
     if (std::isnan(open)) return open;
     openness = std::max(openness, open);
   }
@@ -229,10 +226,7 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
   double previous = std::numeric_limits<double>::infinity(), moved = 0.0;
   for (int i = 0; i < options_.max_iterations; ++i) {
     EvaluateRows(trial);
-    const VecX r_all = Residual(target);
-    VecX r(system_.size());
-    for (int k = 0; k < system_.size(); ++k) r[k] = r_all[selection_[k]];
-    const double largest = Openness(r, target, trial->states.X_WB);
+    const double largest = Openness(target, trial->states.X_WB);
     if (!std::isfinite(largest)) return Step::kSlow;
     const bool small = largest < 1.0;
     if (factored && largest < kRoundOff) return Turned() ? Step::kSingular : Step::kDone;
@@ -243,12 +237,12 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
       // Other row orders have other signs; within one, a change means a singular pose between.
       if (small && Turned()) return Step::kSingular;
     }
-    const VecX step = -system_.SolveTransposed(r);
-    const double size = SizeOf(step, length_);
+    system_.SolveTransposed(missing_, &step_);
+    const double size = SizeOf(step_, length_);
     moved += size;
     if (limit_step && moved > kTrustedCorrection) return Step::kFar;
     if (!(size < 10.0)) return Step::kSlow;
-    MoveBodies(step, &trial->states);
+    MoveBodies(step_, &trial->states);
     if (small) {
       if (size > kNoStep) EvaluateRows(trial);
       return Turned() ? Step::kSingular : Step::kDone;
@@ -269,19 +263,19 @@ void ClosureSolver::Accept(const VecX& target, Trial* trial) {
   orientation_ = system_.determinant_sign();
 }
 
-int ClosureSolver::StepsTo(const VecX& target, VecX* tangent) {
-  VecX rates = VecX::Zero(system_.size());
-  rates.tail(target.size()) = target - target_;
+int ClosureSolver::StepsTo(const VecX& target) {
+  missing_.setZero(system_.size());
+  missing_.tail(target.size()) = target - target_;
   // A short way needs no better factors than those of the last one.
   if (!selection_is_new_) {
-    *tangent = system_.SolveTransposed(rates);
-    if (SizeOf(*tangent, length_) < kShortStep) return 1;
+    system_.SolveTransposed(missing_, &step_);
+    if (SizeOf(step_, length_) < kShortStep) return 1;
   }
   if (!rows_are_here_) EvaluateHere();
   if (!system_.Factor(rows_, selection_, selection_is_new_)) return options_.homotopy_steps;
   selection_is_new_ = false;
-  *tangent = system_.SolveTransposed(rates);
-  const double steps = std::ceil(SizeOf(*tangent, length_) / kFirstStep);
+  system_.SolveTransposed(missing_, &step_);
+  const double steps = std::ceil(SizeOf(step_, length_) / kFirstStep);
   if (!(steps < options_.homotopy_steps)) return options_.homotopy_steps;
   return std::max(1, static_cast<int>(steps));
 }
@@ -379,7 +373,8 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   if (first) {
     if (RunSummary summary = Prepare(); !summary.ok()) return summary;
   }
-  VecX target = target_;
+  VecX& target = next_target_;
+  target = target_;
   target.head(command.position.size()) = command.position;
   if (first) {
     // Prescribed joints without a command stay at their home coordinate.
@@ -410,12 +405,11 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   if (!predict && !first && target == target_) done = true;
   int steps = 4;
   if (!predict && !done) {
-    VecX tangent;
-    steps = StepsTo(target, &tangent);
+    steps = StepsTo(target);
     if (!first && steps == 1) {
       trial_.states = states_;
       trial_.near_values = near_values_;
-      MoveBodies(tangent, &trial_.states);
+      MoveBodies(step_, &trial_.states);
       if (Newton(target, true, &trial_) == Step::kDone) {
         Accept(target, &trial_);
         done = true;
@@ -663,11 +657,11 @@ double ClosureSolver::Miss(const VecX& rates, const std::vector<Vec6>& per_body)
 }
 
 double ClosureSolver::AddMissing(std::vector<Vec6>* per_body) {
-  const VecX change = system_.SolveTransposed(missing_);
+  system_.SolveTransposed(missing_, &step_);
   for (size_t b = 1; b < per_body->size(); ++b) {
-    (*per_body)[b] += change.segment<6>(6 * (static_cast<Eigen::Index>(b) - 1));
+    (*per_body)[b] += step_.segment<6>(6 * (static_cast<Eigen::Index>(b) - 1));
   }
-  return SizeOf(change, length_);
+  return SizeOf(step_, length_);
 }
 
 // The factors belong to a pose nearby; refinement against the true rows restores all digits.

@@ -68,10 +68,9 @@ class ClosureSolver {
   [[nodiscard]] RunSummary Prepare();
   /// Of joints without biases, unless they are asked for.
   void EvaluateRows(Trial* trial, bool biases = false);
-  [[nodiscard]] VecX Residual(const VecX& target) const;
-  /// Largest of the selected residuals as a multiple of its tolerance; NaN if one is.
-  [[nodiscard]] double Openness(const VecX& residual, const VecX& target,
-                                const std::vector<Pose>& X_WB) const;
+  /// What the selected rows miss of the target, into missing_; the largest as a multiple of its
+  /// tolerance, NaN if one is.
+  [[nodiscard]] double Openness(const VecX& target, const std::vector<Pose>& X_WB);
   /// Gap that rounding leaves at these poses [m].
   [[nodiscard]] double Rounding(const std::vector<Pose>& X_WB) const {
     return GapRounding(Reach(lever_, X_WB));
@@ -79,9 +78,9 @@ class ClosureSolver {
   [[nodiscard]] size_t free_rows() const { return commands_.size() + spins_.size(); }
   [[nodiscard]] Step Newton(const VecX& target, bool limit_step, Trial* trial);
   [[nodiscard]] RunSummary Follow(const VecX& target, int first_steps);
-  /// Into how many steps a way is cut first: by the motion that the bodies begin it with,
-  /// `tangent`, which would be the whole way were it straight.
-  [[nodiscard]] int StepsTo(const VecX& target, VecX* tangent);
+  /// Into how many steps a way is cut first: by the motion that the bodies begin it with, step_,
+  /// which would be the whole way were it straight.
+  [[nodiscard]] int StepsTo(const VecX& target);
   /// The determinant has changed its sign since the last pose.
   [[nodiscard]] bool Turned() const {
     return orientation_ != 0 && system_.determinant_sign() != orientation_;
@@ -138,9 +137,12 @@ class ClosureSolver {
 
   BodyStates states_;
   std::vector<std::vector<double>> near_values_;
-  Trial trial_;           ///< work space
-  VecX rates_, missing_;  ///< the same: per row, per selected row
-  VecX target_;           ///< command positions of states_; zero for idle spins
+  VecX target_;  ///< command positions of states_; zero for idle spins
+  // Work space.
+  Trial trial_;
+  std::vector<CouplingRow> coupled_;
+  VecX next_target_, rates_;  ///< per row
+  VecX missing_, step_;       ///< per selected row; twists of the moving bodies
   PosePredictor predictor_;
   struct LastLine {
     MovingDirection line;

@@ -96,13 +96,12 @@ ElementSlope Slope(const FrictionLaw& /*law*/, double /*q*/) { return {}; }
 template <typename Visit>
 void ForElements(const Mechanism& mechanism, const BodyStates& states,
                  const std::vector<int>& friction_signs, const Visit& visit) {
-  if (mechanism.elements.empty()) return;
-  const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
-  for (size_t e = 0; e < rows.size(); ++e) {
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
+    const ScalarRow row = ElementRow(mechanism, e, states);
     const AlongElement at =
-        MotionOf(element, rows[e], states, friction_signs.empty() ? 0 : friction_signs[e]);
-    std::visit([&](const auto& law) { visit(law, rows[e], at); }, element.law);
+        MotionOf(element, row, states, friction_signs.empty() ? 0 : friction_signs[e]);
+    std::visit([&](const auto& law) { visit(law, row, at); }, element.law);
   }
 }
 
@@ -146,19 +145,18 @@ void AddElementPowers(const Mechanism& mechanism, const BodyStates& states,
               });
 }
 
-std::vector<int> FrictionDirections(const Mechanism& mechanism, const BodyStates& states,
-                                    double duration_s) {
-  if (FirstFriction(mechanism).empty()) return {};
-  const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
-  std::vector<int> friction_signs(rows.size(), 0);
-  for (size_t e = 0; e < rows.size(); ++e) {
+void FrictionDirections(const Mechanism& mechanism, const BodyStates& states, double duration_s,
+                        std::vector<int>* signs) {
+  signs->clear();
+  if (std::ranges::none_of(mechanism.elements, HasFriction)) return;
+  signs->resize(mechanism.elements.size(), 0);
+  for (size_t e = 0; e < signs->size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
     if (!HasFriction(element)) continue;
-    const double rate = RateOf(rows[e], states.V_WB);
+    const double rate = RateOf(ElementRow(mechanism, e, states), states.V_WB);
     if (std::abs(rate) <= RestRate(mechanism, element, duration_s)) continue;
-    friction_signs[e] = rate > 0.0 ? 1 : -1;
+    (*signs)[e] = rate > 0.0 ? 1 : -1;
   }
-  return friction_signs;
 }
 
 VecX GradientOf(const ScalarRow& row, size_t bodies) {
@@ -173,12 +171,12 @@ std::vector<VecX> RestingWrenches(const Mechanism& mechanism, const BodyStates& 
                                   const VecX& load_friction) {
   std::vector<VecX> wrenches;
   if (friction_signs.empty()) return wrenches;
-  const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
-  for (size_t e = 0; e < rows.size(); ++e) {
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     if (friction_signs[e] != 0 || !HasFriction(mechanism.elements[e])) continue;
     double most = std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
     if (load_friction.size() > 0) most += load_friction[static_cast<Eigen::Index>(e)];
-    wrenches.push_back(most * GradientOf(rows[e], mechanism.bodies.size()));
+    wrenches.push_back(most *
+                       GradientOf(ElementRow(mechanism, e, states), mechanism.bodies.size()));
   }
   return wrenches;
 }

@@ -25,8 +25,8 @@ namespace mbv::internal {
 
 /// Per force element: the sign of its rate where it has dry friction; 0 at rest (RestRate()) and
 /// for all that has none. Empty for a mechanism without dry friction.
-[[nodiscard]] std::vector<int> FrictionDirections(const Mechanism& mechanism,
-                                                  const BodyStates& states, double duration_s);
+void FrictionDirections(const Mechanism& mechanism, const BodyStates& states, double duration_s,
+                        std::vector<int>* signs);
 
 /// Takes the elements' forces away from the wrenches that bodies need (RequiredWrenches()); that
 /// of rotors at states.A_WB, that of friction in the directions of FrictionDirections().

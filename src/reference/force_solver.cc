@@ -1,8 +1,6 @@
 #include "reference/force_solver.h"
 
 #include <fmt/format.h>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -25,23 +23,29 @@ constexpr double kShare = 1e-7;
 
 }  // namespace
 
-void TakeLeastForces(const MatX& self_stress, Eigen::Index first_driven, VecX* force) {
+void LeastForces::Take(const MatX& self_stress, Eigen::Index first_driven, VecX* force) {
   const Eigen::Index k = self_stress.cols(), driven = force->size() - first_driven;
   if (k == 0) return;
-  const Eigen::HouseholderQR<MatX> qr(self_stress);
-  const MatX Q = qr.householderQ() * MatX::Identity(self_stress.rows(), k);
-  MatX rest = Q;  // self-stresses that leave the driven forces alone
+  qr_.compute(self_stress);
+  Q_.setIdentity(self_stress.rows(), k);
+  householder_.resize(k);
+  qr_.householderQ().applyThisOnTheLeft(Q_, householder_);
   if (driven > 0) {
-    const Eigen::JacobiSVD<MatX> svd(Q.bottomRows(driven),
-                                     Eigen::ComputeThinU | Eigen::ComputeFullV);
-    const VecX& share = svd.singularValues();
+    driven_rows_ = Q_.bottomRows(driven);
+    svd_.compute(driven_rows_, Eigen::ComputeThinU | Eigen::ComputeFullV);
+    const VecX& share = svd_.singularValues();
     Eigen::Index acting = 0;
     while (acting < share.size() && share[acting] > kShare) ++acting;
-    const VecX along = svd.matrixU().leftCols(acting).transpose() * force->tail(driven);
-    *force -= Q * (svd.matrixV().leftCols(acting) * along.cwiseQuotient(share.head(acting)));
-    rest = Q * svd.matrixV().rightCols(k - acting);
+    along_.noalias() = svd_.matrixU().leftCols(acting).transpose() * force->tail(driven);
+    along_.array() /= share.head(acting).array();
+    share_.noalias() = svd_.matrixV().leftCols(acting) * along_;
+    force->noalias() -= Q_ * share_;
+    rest_.noalias() = Q_ * svd_.matrixV().rightCols(k - acting);
+  } else {
+    rest_ = Q_;
   }
-  *force -= rest * (rest.transpose() * *force);
+  rest_share_.noalias() = rest_.transpose() * *force;
+  force->noalias() -= rest_ * rest_share_;
 }
 
 bool SelfStressReaches(const SparseLeastNorm& forces, const SparseLu::Matrix& A,
@@ -182,14 +186,15 @@ void ForceSolver::FindSelfStress() {
   self_stress_.resize(rows_.size(), static_cast<Eigen::Index>(rest_.size()));
   for (size_t k = 0; k < rest_.size(); ++k) {
     const int i = rest_[k];
-    VecX wrench = VecX::Zero(system_.size());
+    missing_.setZero(system_.size());
     for (int p = rows_.start[i]; p < rows_.start[i + 1]; ++p) {
-      wrench.segment<6>(6 * (rows_.body[p] - 1)) = system_.RowScale(rows_.angular[i]) * rows_.J[p];
+      missing_.segment<6>(6 * (rows_.body[p] - 1)) =
+          system_.RowScale(rows_.angular[i]) * rows_.J[p];
     }
-    const VecX balance = -system_.Solve(wrench);
+    system_.Solve(missing_, &part_);
     self_stress_.col(k).setZero();
     for (int b = 0; b < system_.size(); ++b) {
-      self_stress_(basis_[b], k) = balance[b] / system_.RowScale(rows_.angular[basis_[b]]);
+      self_stress_(basis_[b], k) = -part_[b] / system_.RowScale(rows_.angular[basis_[b]]);
     }
     self_stress_(i, k) = 1.0;
   }
@@ -220,40 +225,38 @@ double ForceSolver::Largest(const VecX& wrenches) const {
   return system_.body_scale().cwiseProduct(wrenches).cwiseAbs().maxCoeff();
 }
 
-double ForceSolver::Missing(const VecX& force, const VecX& wrenches, VecX* residual) const {
-  std::vector<Vec6> have(mechanism_.bodies.size(), Vec6::Zero());
-  rows_.AddWrenches(force, &have);
-  *residual = wrenches - Stack(have);
-  return Largest(*residual);
+double ForceSolver::Missing(const VecX& wrenches) {
+  have_.assign(mechanism_.bodies.size(), Vec6::Zero());
+  rows_.AddWrenches(force_, &have_);
+  Stack(have_, &missing_);
+  missing_ = wrenches - missing_;
+  return Largest(missing_);
 }
 
-VecX ForceSolver::LeastNorm(const VecX& wrenches, double* left) {
-  VecX scale(rows_.size());
-  for (int i = 0; i < rows_.size(); ++i) scale[i] = system_.RowScale(rows_.angular[i]);
+double ForceSolver::LeastNorm(const VecX& wrenches) {
+  scale_.resize(rows_.size());
+  for (int i = 0; i < rows_.size(); ++i) scale_[i] = system_.RowScale(rows_.angular[i]);
   if (sparse_) {
-    const VecX force =
-        scale.cwiseProduct(least_.LeastNorm(system_.body_scale().cwiseProduct(wrenches)));
-    VecX missing;
-    *left = Missing(force, wrenches, &missing);
-    return force;
+    force_ = scale_.cwiseProduct(least_.LeastNorm(system_.body_scale().cwiseProduct(wrenches)));
+    return Missing(wrenches);
   }
-  VecX force = VecX::Zero(rows_.size());
-  VecX missing = wrenches;
+  double left = kNan;
+  force_.setZero(rows_.size());
+  missing_ = wrenches;
   // Iterative refinement, which also brings factors of a pose nearby to this one.
   const double round_off = 2 * kEps * Largest(wrenches);
   for (int pass = 0; pass < kMostRefinements; ++pass) {
-    const VecX part = used_->Solve(missing);
-    for (int b = 0; b < system_.size(); ++b) force[basis_[b]] += part[b];
-    const double now = Missing(force, wrenches, &missing);
-    const double before = std::exchange(*left, now);
+    used_->Solve(missing_, &part_);
+    for (int b = 0; b < system_.size(); ++b) force_[basis_[b]] += part_[b];
+    const double now = Missing(wrenches);
+    const double before = std::exchange(left, now);
     if (pass > 0 && !(now > round_off && now < kPassHelps * before)) break;
   }
-  if (rest_.empty()) return force;
-  VecX scaled = force.cwiseQuotient(scale);
-  TakeLeastForces(self_stress_, first_driven_, &scaled);
-  force = scale.cwiseProduct(scaled);
-  *left = Missing(force, wrenches, &missing);
-  return force;
+  if (rest_.empty()) return left;
+  scaled_ = force_.cwiseQuotient(scale_);
+  least_forces_.Take(self_stress_, first_driven_, &scaled_);
+  force_ = scale_.cwiseProduct(scaled_);
+  return Missing(wrenches);
 }
 
 RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample,
@@ -263,20 +266,19 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
     if (!chosen_) SelectAtHome();
     FillRows(sample->states, closure);
   }
-  std::vector<Vec6> required;
-  sample->friction_signs = FrictionDirections(mechanism_, sample->states, duration_s_);
-  RequiredWrenches(mechanism_, sample->states, loads, sample->friction_signs, &required);
-  if (!Stack(required).allFinite()) {
+  FrictionDirections(mechanism_, sample->states, duration_s_, &sample->friction_signs);
+  RequiredWrenches(mechanism_, sample->states, loads, sample->friction_signs, &required_);
+  Stack(required_, &wrenches_);
+  if (!wrenches_.allFinite()) {
     if (RunSummary summary = CheckLoadsAt(mechanism_, sample->states, loads); !summary.ok()) {
       return summary;
     }
   }
-  if (RunSummary summary = CheckSpinsIdle(spins_, sample->states, required, length_);
+  if (RunSummary summary = CheckSpinsIdle(spins_, sample->states, required_, length_);
       !summary.ok()) {
     return summary;
   }
-  const VecX wrenches = Stack(required);
-  const double largest = Largest(wrenches);
+  const double largest = Largest(wrenches_);
 
   // A basis chosen earlier may have become bad; choose again once.
   RunSummary control = RunSummary::Done();
@@ -294,11 +296,9 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
       if (attempt == 0 && !rest_.empty()) continue;
       return control;
     }
-    double left = kNan;
-    VecX force = LeastNorm(wrenches, &left);
-    if (!(left <= kBalanceTolerance * largest)) continue;
-    if (RunSummary summary = AddLoadFriction(sample, &force); !summary.ok()) return summary;
-    Report(force, sample);
+    if (!(LeastNorm(wrenches_) <= kBalanceTolerance * largest)) continue;
+    if (RunSummary summary = AddLoadFriction(sample); !summary.ok()) return summary;
+    Report(force_, sample);
     FindBands(sample);
     return RunSummary::Done();
   }
@@ -367,20 +367,20 @@ RunSummary ForceSolver::CheckLoadsUnique(const ReferenceSample& sample,
 }
 
 // Eqs. 1 and 2 of load_friction.h.
-RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample, VecX* force) {
+RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample) {
   const std::vector<size_t> loaded = LoadedElements(mechanism_);
   sample->load_friction.resize(0);
   if (loaded.empty()) return RunSummary::Done();
   if (RunSummary summary = CheckLoadsUnique(*sample, loaded); !summary.ok()) return summary;
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, sample->states);
   LoadSystem system;
-  MatX unit(force->size(), static_cast<Eigen::Index>(loaded.size()));  // forces per unit of each
-  const MatX reactions = ReactionsOf(*force, sample->states);
-  double left = kNan;
+  VecX force = force_;                                                // without friction by load
+  MatX unit(force.size(), static_cast<Eigen::Index>(loaded.size()));  // forces per unit of each
+  const MatX reactions = ReactionsOf(force, sample->states);
   for (size_t d = 0; d < loaded.size(); ++d) {
     const size_t e = loaded[d];
-    unit.col(static_cast<Eigen::Index>(d)) =
-        -LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()), &left);
+    LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()));
+    unit.col(static_cast<Eigen::Index>(d)) = -force_;
     system.p.push_back(AcrossAxis(mechanism_, e, reactions));
     system.sign.push_back(sample->friction_signs[e]);
     system.per_load.push_back(std::get<FrictionLaw>(mechanism_.elements[e].law).per_load());
@@ -398,8 +398,9 @@ RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample, VecX* force) {
     const auto k = static_cast<Eigen::Index>(d);
     const double size = system.per_load[d] * n[k];
     sample->load_friction[static_cast<Eigen::Index>(loaded[d])] = size;
-    *force -= system.sign[d] * size * unit.col(k);
+    force -= system.sign[d] * size * unit.col(k);
   }
+  force_ = force;
   return RunSummary::Done();
 }
 
@@ -416,16 +417,16 @@ void ForceSolver::TakeRoundoff(VecX* driven) const {
 void ForceSolver::FindBands(ReferenceSample* sample) {
   const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
   const auto bases = static_cast<Eigen::Index>(mechanism_.prescribed.size());
-  VecX band = VecX::Zero(drives + bases);
-  double left = kNan;
+  sample->drive_band.setZero(drives);
+  sample->prescribed_band.setZero(bases);
   for (const VecX& wrenches :
        RestingWrenches(mechanism_, sample->states, sample->friction_signs, sample->load_friction)) {
-    VecX part = LeastNorm(wrenches, &left).segment(first_driven_, drives + bases).cwiseAbs();
+    LeastNorm(wrenches);
+    VecX part = force_.segment(first_driven_, drives + bases).cwiseAbs();
     TakeRoundoff(&part);
-    band += part;
+    sample->drive_band += part.head(drives);
+    sample->prescribed_band += part.tail(bases);
   }
-  sample->drive_band = band.head(drives);
-  sample->prescribed_band = band.tail(bases);
 }
 
 // Newton–Euler at the body origins in world axes, and the energy balance from the same states.

@@ -2,6 +2,8 @@
 // reference/.
 #pragma once
 
+#include <Eigen/QR>
+#include <Eigen/SVD>
 #include <vector>
 
 #include "base/run_summary.h"
@@ -21,10 +23,19 @@ namespace mbv::internal {
 class ClosureSolver;
 
 /// Where statics leaves a choice, one set of forces is taken: first the norm of the driven forces
-/// (drives and prescribed joints) is made least, then that of all forces. `self_stress` (forces ×
-/// k) spans the forces that balance each other; `first_driven` and all later rows are driven.
-/// All forces in N: moments divided by the characteristic length.
-void TakeLeastForces(const MatX& self_stress, Eigen::Index first_driven, VecX* force);
+/// (drives and prescribed joints) is made least, then that of all forces.
+class LeastForces {
+ public:
+  /// `self_stress` (forces × k) spans the forces that balance each other; `first_driven` and all
+  /// later rows are driven. All forces in N: moments divided by the characteristic length.
+  void Take(const MatX& self_stress, Eigen::Index first_driven, VecX* force);
+
+ private:  // work space
+  Eigen::HouseholderQR<MatX> qr_;
+  Eigen::JacobiSVD<MatX> svd_;
+  MatX Q_, driven_rows_, rest_;  ///< columns of length 1; those that leave driven forces alone
+  VecX householder_, along_, share_, rest_share_;
+};
 
 /// Whether a self-stress acts on forces from `first` on, where `forces` solves A x = b for forces
 /// x: a random self-stress has a share in all that one acts on.
@@ -37,7 +48,7 @@ class ForceSolver {
   ForceSolver(const Mechanism& mechanism, double duration_s);
 
   /// Fills forces, bands and reactions of `sample` from its states and driven motion. Where the
-  /// equations leave a choice, TakeLeastForces() decides. Friction at rest is zero in forces and
+  /// equations leave a choice, LeastForces decide. Friction at rest is zero in forces and
   /// reactions; a band is Σ |∂(drive force)/∂(friction)| Fs over what rests, Fs by the load of the
   /// middle. `closure`: solved for these states; its rows and factors are taken where they are
   /// those of the forces.
@@ -54,14 +65,16 @@ class ForceSolver {
   [[nodiscard]] bool FactorSparse();
   void FindSelfStress();
   [[nodiscard]] RunSummary CheckControl(const BodyStates& states);
-  /// `left`: Missing() of the result.
-  [[nodiscard]] VecX LeastNorm(const VecX& wrenches, double* left);
+  /// Into force_; Missing() of the result.
+  double LeastNorm(const VecX& wrenches);
   /// The largest force, moments divided by the characteristic length.
   [[nodiscard]] double Largest(const VecX& wrenches) const;
-  [[nodiscard]] double Missing(const VecX& force, const VecX& wrenches, VecX* residual) const;
+  /// Largest of what force_ misses of the wrenches, which is left in missing_.
+  double Missing(const VecX& wrenches);
   void Report(const VecX& force, ReferenceSample* sample) const;
   void FindBands(ReferenceSample* sample);
-  [[nodiscard]] RunSummary AddLoadFriction(ReferenceSample* sample, VecX* force);
+  /// To force_.
+  [[nodiscard]] RunSummary AddLoadFriction(ReferenceSample* sample);
   [[nodiscard]] RunSummary CheckLoadsUnique(const ReferenceSample& sample,
                                             const std::vector<size_t>& loaded);
   [[nodiscard]] MatX ReactionsOf(const VecX& force, const BodyStates& states) const;
@@ -81,6 +94,10 @@ class ForceSolver {
   SparseLu::Matrix columns_;  ///< of all rows, scaled
   SparseLeastNorm least_;     ///< of many self-stresses that leave the driven forces alone
   bool sparse_ = false;
+  // Work space: per body, of the moving bodies, per row.
+  std::vector<Vec6> required_, have_;
+  VecX wrenches_, missing_, scale_, force_, part_, scaled_;
+  LeastForces least_forces_;
 };
 
 /// Rows of a joint that transmit forces, its first ones: of one that transmits a force only, three.

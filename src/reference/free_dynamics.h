@@ -92,7 +92,7 @@ class FreeDynamics {
   [[nodiscard]] RunSummary Project(double t_s, BodyStates* states, double* moved = nullptr);
 
   /// Reactions, forces of all drives and prescribed joints, powers and energies, from complete
-  /// states; TakeLeastForces() where statics leaves a choice.
+  /// states; LeastForces where statics leaves a choice.
   void Forces(double t_s, ReferenceSample* sample);
 
   /// Powers that WorkChannels() integrates, from complete states.

@@ -26,12 +26,12 @@ constexpr double kStalledLoads = 1e-12;
 
 }  // namespace
 
-// The forces with columns · force = wrenches as well as can be; TakeLeastForces() of them.
+// The forces with columns · force = wrenches as well as can be; LeastForces of them.
 VecX FreeDynamics::ForceRows::Solve(const VecX& scaled_wrenches) const {
   if (columns.cols() == 0) return VecX();
   VecX force = factors.solve(scaled_wrenches);
   force += factors.solve(VecX(scaled_wrenches - columns * force));  // refinement
-  if (self_stress.cols() > 0) TakeLeastForces(self_stress, first_driven, &force);
+  if (self_stress.cols() > 0) LeastForces().Take(self_stress, first_driven, &force);
   return force.cwiseProduct(scale);
 }
 
@@ -79,7 +79,8 @@ std::vector<int> FreeDynamics::SignsAt(const BodyStates& states) const {
   std::vector<int> sign = phase_.sign;
   if (sign.empty()) sign.assign(mechanism_.elements.size(), 0);  // before the first phase
   if (phase_.led.empty()) return sign;
-  const std::vector<int> signs = FrictionDirections(mechanism_, states, motion_.duration_s);
+  std::vector<int> signs;
+  FrictionDirections(mechanism_, states, motion_.duration_s, &signs);
   for (const size_t e : phase_.led) sign[e] = signs[e];
   return sign;
 }

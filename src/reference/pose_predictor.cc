@@ -19,7 +19,9 @@ constexpr double kBelieved = 0.02;
 void PosePredictor::Remember(double time_s, const BodyStates& states) {
   std::rotate(times_s_.begin(), times_s_.end() - 1, times_s_.end());
   times_s_[0] = time_s;
-  history_.Remember(Stack(states.V_WB), Stack(states.A_WB));
+  Stack(states.V_WB, &V_);
+  Stack(states.A_WB, &A_);
+  history_.Remember(V_, A_);
 }
 
 int PosePredictor::Usable(double dt_s) const {

@@ -146,8 +146,8 @@ const ForceElement* ReducedModel::friction_by_load() const {
 
 VecX ReducedModel::Forces(const MatX& T, const std::vector<LoadSample>& loads) {
   std::vector<Vec6> required;
-  const std::vector<int> signs =
-      internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s);
+  std::vector<int> signs;
+  internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s, &signs);
   internal::RequiredWrenches(impl_->mechanism, states(), loads, signs, &required);
   return T.transpose() * internal::Stack(required);
 }
@@ -156,8 +156,8 @@ RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSamp
                                        const VecX& drive_forces, VecX* a) {
   const Mechanism& mechanism = impl_->mechanism;
   RunSummary summary;
-  const std::vector<int> signs =
-      internal::FrictionDirections(mechanism, states(), impl_->motion.duration_s);
+  std::vector<int> signs;
+  internal::FrictionDirections(mechanism, states(), impl_->motion.duration_s, &signs);
   const ForceElement* undetermined = friction_by_load();
   const char* why = "has friction that grows with its load";
   for (size_t e = 0; e < mechanism.elements.size() && undetermined == nullptr; ++e) {

@@ -39,14 +39,14 @@ void SampleRecorder::RecordJoints(ReferenceSample* sample) {
 }
 
 void SampleRecorder::RecordDriven(ReferenceSample* sample) {
-  const std::vector<ScalarRow> rows = DrivenRows(mechanism_, sample->states);
-  const auto count = static_cast<Eigen::Index>(rows.size());
+  const auto count =
+      static_cast<Eigen::Index>(mechanism_.drives.size() + mechanism_.prescribed.size());
   DrivenSample& driven = sample->driven;
   driven.position.resize(count);
   driven.velocity.resize(count);
   driven.acceleration.resize(count);
   for (Eigen::Index i = 0; i < count; ++i) {
-    const ScalarRow& row = rows[static_cast<size_t>(i)];
+    const ScalarRow row = DrivenRow(mechanism_, static_cast<size_t>(i), sample->states);
     driven.position[i] = row.value;
     driven.velocity[i] = RateOf(row, sample->states.V_WB);
     driven.acceleration[i] = RateOf(row, sample->states.A_WB) + row.bias;

@@ -144,16 +144,16 @@ bool SquareSystem::Factor(const RowSet& rows, const std::vector<int>& selection,
   return true;
 }
 
-VecX SquareSystem::Solve(const VecX& wrenches) {
-  VecX x = body_scale_.cwiseProduct(wrenches);
-  lu_.Solve(&x);
-  return row_scale_.cwiseProduct(x);
+void SquareSystem::Solve(const VecX& wrenches, VecX* x) const {
+  *x = body_scale_.cwiseProduct(wrenches);
+  lu_.Solve(x);
+  *x = row_scale_.cwiseProduct(*x);
 }
 
-VecX SquareSystem::SolveTransposed(const VecX& rates) {
-  VecX x = row_scale_.cwiseProduct(rates);
-  lu_.SolveTransposed(&x);
-  return body_scale_.cwiseProduct(x);
+void SquareSystem::SolveTransposed(const VecX& rates, VecX* V) const {
+  *V = row_scale_.cwiseProduct(rates);
+  lu_.SolveTransposed(V);
+  *V = body_scale_.cwiseProduct(*V);
 }
 
 double SquareSystem::SmallestSingularValue(int iterations) {
@@ -180,11 +180,16 @@ double SquareSystem::SmallestSingularValue(int iterations) {
   return sigma;
 }
 
-VecX Stack(const std::vector<Vec6>& per_body) {
-  VecX stacked(6 * (static_cast<Eigen::Index>(per_body.size()) - 1));
+void Stack(const std::vector<Vec6>& per_body, VecX* stacked) {
+  stacked->resize(6 * (static_cast<Eigen::Index>(per_body.size()) - 1));
   for (size_t b = 1; b < per_body.size(); ++b) {
-    stacked.segment<6>(6 * (static_cast<Eigen::Index>(b) - 1)) = per_body[b];
+    stacked->segment<6>(6 * (static_cast<Eigen::Index>(b) - 1)) = per_body[b];
   }
+}
+
+VecX Stack(const std::vector<Vec6>& per_body) {
+  VecX stacked;
+  Stack(per_body, &stacked);
   return stacked;
 }
 

@@ -43,9 +43,9 @@ class SquareSystem {
   [[nodiscard]] int determinant_sign() const { return determinant_sign_; }
 
   /// x with Σ x_i J_iᵀ = b; b stacks the wrenches [m; f] of the moving bodies.
-  [[nodiscard]] VecX Solve(const VecX& wrenches);
+  void Solve(const VecX& wrenches, VecX* x) const;
   /// V with J_i · V = rates_i, stacked for the moving bodies.
-  [[nodiscard]] VecX SolveTransposed(const VecX& rates);
+  void SolveTransposed(const VecX& rates, VecX* V) const;
 
   /// Estimate of the smallest singular value (scaled, dimensionless; the largest is of order one)
   /// by inverse iteration started from the previous estimate.
@@ -82,6 +82,7 @@ class SquareSystem {
 }
 
 /// Stacks the moving bodies' entries of `per_body` and back.
+void Stack(const std::vector<Vec6>& per_body, VecX* stacked);
 [[nodiscard]] VecX Stack(const std::vector<Vec6>& per_body);
 void Unstack(const VecX& stacked, std::vector<Vec6>* per_body);
 /// Largest rotation [rad] or translation [characteristic lengths] of stacked twists.

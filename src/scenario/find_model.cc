@@ -90,7 +90,7 @@ std::optional<std::string> FindModel(const std::string& name, const fs::path& st
     const fs::path path = fs::path(name).is_absolute() ? fs::path(name) : start / name;
     std::error_code error;
     // A pipe will do.
-    if (fs::exists(path, error) && !IsFolder(path)) return Shown(path);
+    if (fs::exists(path, error) && !IsFolder(path)) return Shown(CompletedModel(path.string()));
     return std::nullopt;
   }
   for (const fs::path& folder : ModelFolders(start)) {

@@ -318,8 +318,9 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
       yaml_.Error(motion,
                   fmt::format("motion commands coordinates that depend on each other: {}",
                               JoinWords(DependentNames(rank))),
-                  fmt::format("leave out {} of them; not held yet: {}; {}", rank.redundant,
-                              JoinWords(rank.free_joints), ChoiceHint(rank)));
+                  fmt::format("leave out {} of them; not held yet: {}", rank.redundant,
+                              JoinWords(rank.free_joints)) +
+                      ChoiceHint());
     }
   }
 
@@ -347,22 +348,24 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     return hint;
   }
 
-  // An independent set with what the motion commands, drives before outputs before joints.
-  [[nodiscard]] std::string ChoiceHint(const CommandRank& rank) const {
+  // What would make the commands an independent set; "" where sums of coordinates are commanded.
+  [[nodiscard]] std::string ChoiceHint() const {
     std::vector<Coordinate> candidates;
     for (const Command& command : scenario_.motion.commands) {
-      if (command.terms.size() == 1) candidates.push_back(command.terms.front().coordinate);
+      if (command.terms.size() != 1) return "";
+      candidates.push_back(command.terms.front().coordinate);
     }
+    const size_t given = candidates.size();
     for (const NamedCoordinate& named : NamedMotionCoordinates(*mechanism_)) {
-      const bool given = std::ranges::find(candidates, named.coordinate) != candidates.end();
-      if (!given) candidates.push_back(named.coordinate);
+      if (std::ranges::find(candidates, named.coordinate) == candidates.end()) {
+        candidates.push_back(named.coordinate);
+      }
     }
     std::vector<std::string> names;
     for (const size_t k : ChooseCoordinates(*mechanism_, candidates, candidates.size()).chosen) {
-      names.push_back(NameOf(*mechanism_, candidates[k]));
+      if (k >= given) names.push_back(NameOf(*mechanism_, candidates[k]));
     }
-    return fmt::format("{} independent coordinates move {}, for instance {}", rank.dofs,
-                       mechanism_->name, JoinWords(names));
+    return names.empty() ? "" : "; for instance command also " + JoinWords(names);
   }
 
   [[nodiscard]] std::string CountHint(const CommandRank& rank, bool too_few) const {
@@ -370,16 +373,16 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
       return fmt::format(
                  "command drives, joints, outputs (OUTPUT.x …), prescribed joints, or couple "
                  "drives under motion.equal; what moves by forces needs motion.initial; not held "
-                 "yet: {}; {}",
-                 JoinWords(rank.free_joints), ChoiceHint(rank)) +
-             SpinHint();
+                 "yet: {}",
+                 JoinWords(rank.free_joints)) +
+             ChoiceHint() + SpinHint();
     }
     std::string hint = "leave commands out: each further one contradicts the others";
     if (!rank.dependent.empty()) hint += "; " + JoinWords(DependentNames(rank)) + " are dependent";
     if (static_cast<int>(mechanism_->drives.size()) > rank.dofs) {
       hint += "; drives that are not commanded share the force by least norm";
     }
-    return hint + "; " + ChoiceHint(rank);
+    return hint;
   }
 };
 

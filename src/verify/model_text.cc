@@ -111,7 +111,7 @@ LoadedBodies LoadRobotBodies(const std::string& file) {
 }
 
 LoadResult LoadRobot(const std::string& file, const LoadOptions& options) {
-  return IsForeign(file) ? LoadForeign(file, options) : LoadModel(file, options);
+  return IsForeign(file) ? LoadForeign(file, options) : LoadModel(CompletedModel(file), options);
 }
 
 namespace {

@@ -2,8 +2,8 @@
 // printed limb does.
 #include <gtest/gtest.h>
 
-#include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/cabin_robot_stiffness_fixture.h"
+#include "tests/support/allocation_counter.h"
 
 namespace mbv::cabin {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "analytic/closed_form.h"
 #include "analytic/scara_robot/closed_form.h"
-#include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/scara_robot_fixture.h"
+#include "tests/support/allocation_counter.h"
 
 namespace mbv::scara {
 namespace {

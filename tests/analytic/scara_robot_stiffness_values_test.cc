@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/scara_robot_stiffness_fixture.h"
+#include "tests/support/allocation_counter.h"
 
 namespace mbv::scara {
 namespace {

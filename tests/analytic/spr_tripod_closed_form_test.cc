@@ -9,8 +9,8 @@
 
 #include "model_file/load_model.h"
 #include "reference/reference.h"
-#include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/spr_tripod_model.h"
+#include "tests/support/allocation_counter.h"
 #include "tests/support/source_dir.h"
 
 namespace mbv::spr_tripod {

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "model_file/load_model.h"
-#include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
+#include "tests/support/allocation_counter.h"
 #include "tests/support/source_dir.h"
 
 namespace mbv::stabilizing_platform {

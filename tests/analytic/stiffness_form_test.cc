@@ -8,8 +8,8 @@
 #include <set>
 #include <string>
 
-#include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/scara_robot_stiffness_fixture.h"
+#include "tests/support/allocation_counter.h"
 
 namespace mbv {
 namespace {

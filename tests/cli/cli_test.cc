@@ -91,6 +91,38 @@ TEST_F(CliTest, UrdfLeavesBeamsOutWithAWarning) {
   EXPECT_EQ(mbverify("model scara_robot --format urdf").err.find("beams"), std::string::npos);
 }
 
+// What URDF cannot say lies beside it, and is found there.
+TEST_F(CliTest, UrdfIsCompletedByTheFileBesideIt) {
+  const auto has = [](const std::string& text, const std::string& key) {
+    return text.find(key) != std::string::npos;
+  };
+  const std::vector<std::pair<std::string, std::vector<std::string>>> cases = {
+      {"geared_press", {"couplings:", "springs:"}},
+      {"slider_crank", {"motors:"}},
+      {"machine_five_bar", {"couplings:", "kind: friction", "kind: rotor"}}};
+  for (const auto& [model, keys] : cases) {
+    const std::string urdf = (mbverify.folder() / (model + ".urdf")).string();
+    const std::string companion = (mbverify.folder() / (model + ".mbverify.yaml")).string();
+    const ProgramResult written = mbverify("model " + model + " --format urdf --out " + urdf);
+    ASSERT_EQ(written.exit_code, 0) << written.err;
+    EXPECT_NE(written.err.find(model + ".mbverify.yaml completes it"), std::string::npos);
+    const ProgramResult back = mbverify("model " + urdf + " --format yaml");
+    EXPECT_EQ(back.exit_code, 0) << back.err;
+    fs::rename(companion, companion + ".old");
+    const ProgramResult alone = mbverify("model " + urdf + " --format yaml");
+    for (const std::string& key : keys) {
+      EXPECT_TRUE(has(back.out, key)) << key << "\n" << back.out;
+      EXPECT_FALSE(has(alone.out, key)) << key;
+    }
+    // One that somebody else wrote stays, and nothing is written.
+    std::ofstream(companion) << "shopping: list\n";
+    fs::remove(urdf);
+    EXPECT_EQ(mbverify("model " + model + " --format urdf --out " + urdf).exit_code, 2);
+    EXPECT_FALSE(fs::exists(urdf));
+    EXPECT_EQ(ReadAll(companion), "shopping: list\n");
+  }
+}
+
 TEST_F(CliTest, MutateTakesPercentAndWritesJson) {
   const std::string json = (mbverify.folder() / "m.json").string();
   const ProgramResult result = mbverify(

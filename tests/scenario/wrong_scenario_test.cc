@@ -53,8 +53,9 @@ std::vector<Golden> Goldens() {
       {"TooFewCommands", replaced("    pitch: 0\n", ""),
        At("3:3",
           "motion gives 8 commands, but stabilizing_platform has 9 degrees of freedom\n"
-          "  hint: command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives "
-          "under motion.equal; what moves by forces needs motion.initial; not held yet: pitch, "
+          "  hint: command drives, joints, outputs (OUTPUT.x …), prescribed joints, or couple "
+          "drives under motion.equal; what moves by forces needs motion.initial; not held yet: "
+          "pitch, "
           "platform_free, limb1.U1, limb1.U1_p, limb1.R12, limb1.R12_p, limb1.R22, limb1.S, …")},
       {"TooManyCommands", replaced("    pitch: 0\n", "    pitch: 0\n    platform.yaw: 0\n"),
        At("3:3",

@@ -552,12 +552,20 @@ BatchStatus Solver::InverseDynamicsRows(const MatX& q, const MatX& v, const MatX
   CheckRows("a", a, q.rows(), size());
   drive_forces->setConstant(q.rows(), static_cast<Eigen::Index>(model().mechanism().drives.size()),
                             kNan);
-  const auto make = [this] { return ReducedModel(model().mechanism(), impl_->at); };
-  return ForRows(make, q.rows(), threads, progress, [&](ReducedModel* reduced, Eigen::Index i) {
-    RunSummary summary =
-        reduced->Move(q.row(i).transpose(), v.row(i).transpose(), a.row(i).transpose());
-    if (summary.ok()) summary = reduced->AllForces({});
-    if (summary.ok()) drive_forces->row(i) = reduced->drive_force().transpose();
+  struct Block {
+    ReducedModel reduced;
+    VecX q, v, a;
+  };
+  const auto make = [this] {
+    return Block{ReducedModel(model().mechanism(), impl_->at), VecX(), VecX(), VecX()};
+  };
+  return ForRows(make, q.rows(), threads, progress, [&](Block* at, Eigen::Index i) {
+    at->q = q.row(i).transpose();
+    at->v = v.row(i).transpose();
+    at->a = a.row(i).transpose();
+    RunSummary summary = at->reduced.Move(at->q, at->v, at->a);
+    if (summary.ok()) summary = at->reduced.AllForces({});
+    if (summary.ok()) drive_forces->row(i) = at->reduced.drive_force().transpose();
     return StatusOf(summary);
   });
 }

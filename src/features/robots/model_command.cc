@@ -13,6 +13,7 @@
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "model_file/load_model.h"
+#include "model_file/urdf/urdf_import.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
 #include "verify/check_file.h"
@@ -62,6 +63,22 @@ std::string WithHead(const JsonOption& json, const std::string& text) {
   return json.Text(ParseJson<nlohmann::ordered_json>(text));
 }
 
+// What URDF cannot say lies beside it, where it is found by who reads the URDF.
+int WriteUrdfFiles(const std::string& path, const std::string& text, const LoadResult& loaded,
+                   const std::vector<InputFile>& inputs) {
+  if (fs::path(path).extension() != ".urdf") return WriteWholeFile(path, text, inputs);
+  const std::string companion = UrdfCompanionPath(path);
+  const std::string completed =
+      WriteUrdfCompanion(*loaded.mechanism, fs::path(path).filename(), loaded.caveats);
+  if (const std::string why = WhyForeign(path, text); !why.empty()) return Refuse(why, "");
+  if (const int refused = WriteWholeFile(companion, completed, inputs); refused != 0) {
+    return refused;
+  }
+  const int exit_code = WriteWholeFile(path, text, inputs);
+  if (exit_code == 0) Say(stderr, "{} completes it, and is found beside it\n", companion);
+  return exit_code;
+}
+
 int Model(const ModelArguments& arguments) {
   if (!arguments.drives.empty() && FormatOf(arguments.format) != ModelFormat::kMjcf) {
     return Refuse("--drives says what holds the drives of an MJCF", "add --format mjcf");
@@ -106,7 +123,9 @@ int Model(const ModelArguments& arguments) {
   if (format == ModelFormat::kJson) text = WithHead(arguments.json, text);
   int exit_code = 0;
   if (!arguments.out.empty()) {
-    exit_code = WriteWholeFile(arguments.out, text, inputs.files());
+    exit_code = format == ModelFormat::kUrdf
+                    ? WriteUrdfFiles(arguments.out, text, loaded, inputs.files())
+                    : WriteWholeFile(arguments.out, text, inputs.files());
   } else if (IsForPeople(arguments.format)) {
     SayText(arguments.json.text(), text);
   } else {

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -14,7 +15,9 @@
 #include "math/parallel_transport.h"
 #include "math/spatial.h"
 #include "mechanism/joint_pose.h"
+#include "mechanism/reach.h"
 #include "model_file/element_text.h"
+#include "model_file/model_drives.h"
 #include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
 
@@ -602,10 +605,15 @@ class Companion {
     WriteClosures();
     WriteDrives();
     WriteRest();
-    std::string text = fmt::format(
-        "name: {}\nurdf:\n  file: \"{}\"\n  constraints: false\n  guess:\n{}gravity: {}\n",
-        YamlName(m_.name), urdf_file, guesses_, List(m_.gravity_W));
-    text += "attach:\n";
+    std::string text =
+        fmt::format("name: {}\nurdf:\n  file: \"{}\"\n  constraints: false\n{}{}gravity: {}\n",
+                    YamlName(m_.name), urdf_file, guesses_.empty() ? "" : "  guess:\n", guesses_,
+                    List(m_.gravity_W));
+    if (std::ranges::any_of(m_.bodies,
+                            [](const Body& b) { return !ImpossibleInertia(b).empty(); })) {
+      text += "allow: impossible_inertia\n";
+    }
+    if (!attached_.empty()) text += "attach:\n";
     for (const auto& [body, frames] : attached_) {
       text += fmt::format("  \"{}\":\n{}", m_.bodies[body].name, frames);
     }
@@ -698,6 +706,11 @@ class Companion {
       if (IsLimited(drive.range)) line += ", range: " + RangeText(drive.range);
       sections_["drives"] += line + "}\n";
     }
+    for (const Motor& motor : m_.motors) {
+      sections_["motors"] +=
+          fmt::format("  {}: {{{}}}\n", YamlName(m_.drives[static_cast<size_t>(motor.drive)].name),
+                      internal::MotorText(motor));
+    }
   }
 
   void WriteRest() {
@@ -769,8 +782,13 @@ class Companion {
 
 }  // namespace
 
-std::string WriteUrdfCompanion(const Mechanism& mechanism, const std::string& urdf_file) {
-  return Companion(mechanism).Text(urdf_file);
+std::string WriteUrdfCompanion(const Mechanism& mechanism, const std::string& urdf_file,
+                               const std::vector<ModelCaveat>& caveats) {
+  return Companion(mechanism).Text(urdf_file) + LeftOutText(caveats);
+}
+
+std::string UrdfCompanionPath(const std::string& urdf_file) {
+  return std::filesystem::path(urdf_file).replace_extension(".mbverify.yaml").string();
 }
 
 }  // namespace mbv

@@ -26,9 +26,12 @@ namespace mbv {
 /// of the URDF. Meshes are named relative to the folder of Mechanism::file where they lie below it.
 [[nodiscard]] std::string WriteUrdf(const Mechanism& mechanism);
 
-/// The model.yaml in that comment.
+/// The model.yaml in that comment, and what the model's source left out.
 [[nodiscard]] std::string WriteUrdfCompanion(const Mechanism& mechanism,
-                                             const std::string& urdf_file);
+                                             const std::string& urdf_file,
+                                             const std::vector<ModelCaveat>& caveats = {});
+/// Where it is found by who reads the URDF: robot.mbverify.yaml beside robot.urdf.
+[[nodiscard]] std::string UrdfCompanionPath(const std::string& urdf_file);
 
 /// What a URDF file holds.
 struct UrdfTree {

@@ -17,6 +17,7 @@
 #include "kinematics/command_rank.h"
 #include "mechanism/mechanism.h"
 #include "scenario/load_scenario.h"
+#include "tests/support/allocation_counter.h"
 #include "tests/support/shipped.h"
 #include "tests/support/test_folder.h"
 #include "verify/model_text.h"
@@ -638,6 +639,36 @@ TEST_F(SolverRows, DoNotDependOnThreads) {
     EXPECT_LT(Worst(one.row(i).transpose(), forces.drives), 1e-9);
   }
 }
+
+// After the first samples of a block, whatever the joints, force elements and couplings are.
+class SolverAllocations : public testing::TestWithParam<std::string> {};
+
+TEST_P(SolverAllocations, OfRowsDoNotGrowWithTheirNumber) {
+  const Model model = Model::Load(ModelPath(GetParam()));
+  const Solver solver(model, IndependentOf(model.mechanism()));
+  const Eigen::Index n = solver.size(), rows = Solver::kBlock;
+  Random random(5);
+  MatX q(rows, n), v(rows, n), a(rows, n);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    q.row(i) = (solver.home() + random(n, 1e-3)).transpose();
+    v.row(i) = random(n, 0.5).transpose();
+    a.row(i) = random(n, 2.0).transpose();
+  }
+  const auto count = [&](Eigen::Index some) {
+    MatX forces;
+    const MatX q_some = q.topRows(some), v_some = v.topRows(some), a_some = a.topRows(some);
+    const size_t before = AllocationCount();
+    EXPECT_TRUE(Done(solver.InverseDynamicsRows(q_some, v_some, a_some, &forces, 1)));
+    return AllocationCount() - before;
+  };
+  (void)count(rows);
+  EXPECT_EQ(count(rows), count(rows / 8));
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, SolverAllocations,
+                         testing::Values("stewart", "stabilizing_platform", "spr_tripod",
+                                         "scara_robot", "cabin_robot", "redundant_five_bar",
+                                         "geared_press", "rubbing_five_bar", "bushed_linkage"));
 
 TEST_F(SolverRows, NameTheOnesThatFail) {
   MatX expected, forces;

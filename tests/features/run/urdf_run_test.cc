@@ -11,6 +11,7 @@
 #include "model_file/load_model.h"
 #include "model_file/urdf/urdf_import.h"
 #include "tests/support/source_dir.h"
+#include "verify/model_text.h"
 
 namespace mbv {
 namespace {
@@ -66,10 +67,10 @@ TEST_P(ExportedModel, RunsAgainWithTheSameDriveForces) {
   const LoadResult loaded = LoadModel(shipped);
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const fs::path folder = fs::path(testing::TempDir()) / "mbv_urdf_run" / GetParam().model;
-  Write(folder / "robot.urdf", WriteUrdf(*loaded.mechanism));
-  const std::string model =
-      Write(folder / "model.yaml", WriteUrdfCompanion(*loaded.mechanism, "robot.urdf"));
-  const LoadResult back = LoadModel(model);
+  // What completes the URDF is found beside it.
+  const std::string model = Write(folder / "robot.urdf", WriteUrdf(*loaded.mechanism));
+  Write(UrdfCompanionPath(model), WriteUrdfCompanion(*loaded.mechanism, "robot.urdf"));
+  const LoadResult back = LoadRobot(model);
   ASSERT_TRUE(back.mechanism) << back.diagnostics.Text();
 
   RunOptions options;
