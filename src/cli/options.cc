@@ -31,19 +31,33 @@ void AddRobotOptions(CLI::App* command, RobotArguments* arguments) {
   command->add_option("--base", arguments->base,
                       "body or link of a robot that is held; by default its root, where joints or "
                       "loops do not hold it in the world");
+  command->add_flag("--free-base", arguments->free_base,
+                    "nothing is held: a free joint carries the root of the robot");
+  command
+      ->add_option("--plant", arguments->plants,
+                   "BODY, BODY:point|line|sole@x,y,z or {on: BODY, …}: this foot stands on the "
+                   "ground, the base is free (repeatable)")
+      ->allow_extra_args(false);
   AddToleranceOption(command, &arguments->closure_tolerance_m);
 }
 
 int RefuseRobotOptions() {
-  return Refuse("--assembly, --base and --closure-tolerance are for robots (.urdf, .xml, .sdf)",
+  return Refuse("--assembly, --base, --free-base, --plant and --closure-tolerance are for robots (.urdf, .xml, "
+                ".sdf)",
                 "a model file says it itself: guesses of the joints, what is fixed to the world, "
-                "closure_tolerance");
+                "contacts, closure_tolerance");
 }
 
 bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options) {
   options->base = arguments.base;
+  options->free_base = arguments.free_base || !arguments.plants.empty();
+  options->plants = arguments.plants;
   options->closure_tolerance_m = arguments.closure_tolerance_m;
   bool good = true;
+  if (options->free_base && !options->base.empty()) {
+    Say(stderr, "--base {}: error: --free-base and --plant hold no body\n", options->base);
+    good = false;
+  }
   for (const std::string& text : arguments.assembly) {
     const size_t at = text.rfind('=');
     const std::string number = at == std::string::npos ? "" : text.substr(at + 1);

@@ -20,10 +20,13 @@ struct LoadOptions;  // model_file/load_model.h
 struct RobotArguments {
   std::vector<std::string> assembly;  ///< CLOSURE=N
   std::string base;                   ///< the body or link that is held
+  bool free_base = false;             ///< nothing is held
+  std::vector<std::string> plants;    ///< feet on the ground, LoadOptions::plants
   double closure_tolerance_m = kNan;  ///< NaN: what the digits of the file explain
 
   [[nodiscard]] bool any() const {
-    return !assembly.empty() || !base.empty() || std::isfinite(closure_tolerance_m);
+    return !assembly.empty() || !base.empty() || free_base || !plants.empty() ||
+           std::isfinite(closure_tolerance_m);
   }
 };
 void AddRobotOptions(CLI::App* command, RobotArguments* arguments);
@@ -32,7 +35,7 @@ void AddRobotOptions(CLI::App* command, RobotArguments* arguments);
 /// --closure-tolerance alone.
 void AddToleranceOption(CLI::App* command, double* tolerance_m);
 
-/// False after a message: --assembly is not CLOSURE=N, N from 1.
+/// False after a message: --assembly is not CLOSURE=N, N from 1; --base with --free-base or --plant.
 [[nodiscard]] bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options);
 
 // --json of the commands that print a result: the same for programs.

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "base/text.h"
+#include "comparison/contact_load.h"
 #include "comparison/driven.h"
 #include "comparison/verdict.h"
 #include "mechanism/channels.h"
@@ -231,6 +234,25 @@ Caveat LeftOutCaveat(const std::string& text) {
       .kind = CaveatKind::kLeftOut, .of = {"mechanism"}, .text = "not the whole robot: " + text};
 }
 
+// Feet that the ground does not hold, each limit once: by the first witness that shows it.
+std::vector<Caveat> ContactCaveats(const ComparisonInput& input) {
+  std::vector<Caveat> caveats;
+  std::set<std::pair<std::string, ContactLoad::Limit>> known;
+  for (const Witness& witness : input.witnesses) {
+    if (witness.trace == nullptr || !witness.ran() || input.mechanism->contacts.empty()) continue;
+    for (const ContactLoad& load :
+         ContactLoadsOf(*input.mechanism, *witness.trace, input.reactions_not_unique)) {
+      for (const ContactLoad::Use& use : load.uses) {
+        if (!use.exceeded() || !known.emplace(load.contact, use.limit).second) continue;
+        caveats.push_back({.kind = CaveatKind::kContact,
+                           .of = {load.name()},
+                           .text = ExceededText(load, use)});
+      }
+    }
+  }
+  return caveats;
+}
+
 Caveat MissingWitnessCaveat(const std::string& witness, WitnessGap gap, const std::string& why) {
   return {.kind = CaveatKind::kWitnessMissing,
           .of = {witness},
@@ -285,6 +307,7 @@ std::vector<Caveat> CaveatsOf(const ComparisonInput& input, const Comparison& co
   for (const std::string& text : input.left_out) {
     all.push_back(LeftOutCaveat(text));
   }
+  for (Caveat& contact : ContactCaveats(input)) all.push_back(std::move(contact));
   if (Caveat own = IntegrationErrors(input, comparison); !own.of.empty()) {
     all.insert(all.begin(), std::move(own));
   }

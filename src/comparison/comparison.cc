@@ -474,6 +474,8 @@ const char* ToText(CaveatKind kind) {
       return "witness_in_part";
     case CaveatKind::kLeftOut:
       return "left_out";
+    case CaveatKind::kContact:
+      return "contact";
   }
   return "?";
 }

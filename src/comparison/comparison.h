@@ -261,6 +261,7 @@ enum class CaveatKind {
   kWitnessMissing,  ///< a witness of the scenario gave nothing to compare
   kWitnessInPart,   ///< a program gave the forces of some drives only
   kLeftOut,         ///< what acts on forces in a robot's file and not in the model
+  kContact,         ///< a foot that is computed as holding would lift, slip, tip or twist
 };
 [[nodiscard]] const char* ToText(CaveatKind kind);  ///< "witness_missing"
 

@@ -92,6 +92,37 @@ std::string ForceUnit(const Mechanism& mechanism, const Drive& drive) {
   return IsTranslation(mechanism, drive) ? "N" : "N m";
 }
 
+// The upper and the lower chain, each of left turns only [Andrew 1979].
+std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points) {
+  const auto turns_left = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                             const Eigen::Vector2d& c) {
+    const Eigen::Vector2d u = b - a, v = c - b;
+    return u.x() * v.y() - u.y() * v.x() > 0.0;
+  };
+  std::ranges::sort(points, [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+  });
+  std::vector<Eigen::Vector2d> hull;
+  if (points.empty()) return hull;
+  for (int pass = 0; pass < 2; ++pass) {
+    const size_t first = hull.size();
+    for (const Eigen::Vector2d& p : points) {
+      while (hull.size() >= first + 2 && !turns_left(hull[hull.size() - 2], hull.back(), p)) {
+        hull.pop_back();
+      }
+      hull.push_back(p);
+    }
+    hull.pop_back();  // the other chain begins with it
+    std::ranges::reverse(points);
+  }
+  return hull;
+}
+
+const char* WordOf(Contact::Kind kind) {
+  static constexpr std::array<const char*, 3> kWords = {"point", "line", "sole"};
+  return kWords.at(static_cast<size_t>(kind));
+}
+
 const char* WordOf(const ForceElement& element) {
   static constexpr std::array<const char*, std::variant_size_v<decltype(element.law)>> kWords = {
       "damping", "spring", "rotor", "friction"};

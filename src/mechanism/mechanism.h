@@ -316,6 +316,29 @@ struct Bushing {
   Pose X_CM = Pose::Identity();
 };
 
+/// A foot on the ground. While it holds, a joint named as it ties its body to the ground: a ball in
+/// a point, a hinge about a line, a weld of a sole. The joint's frame F has its origin in the
+/// contact, z along the ground's normal and x along the line or the sole. Ground only pushes, and
+/// friction is limited: witnesses compute with the joint, and what it bears is judged afterwards
+/// (comparison/contact_load.h).
+struct Contact {
+  enum class Kind { kPoint, kLine, kSole };
+  std::string name;
+  Kind kind = Kind::kSole;
+  int joint = -1;          ///< index; -1: the foot is lifted
+  double friction = kNan;  ///< coefficient μ >= 0; NaN: not stated
+  double torsion = kNan;   ///< moment about the normal per normal force that friction bears [m]
+  /// What touches the ground in F's x, y [m]: of a sole a convex polygon, counter-clockwise, of a
+  /// line its two ends; empty where it is not stated, and of points.
+  std::vector<Eigen::Vector2d> outline;
+};
+
+/// Corners of the convex hull, counter-clockwise; fewer than three where it has no area.
+[[nodiscard]] std::vector<Eigen::Vector2d> ConvexHull(std::vector<Eigen::Vector2d> points);
+
+/// "point", "line", "sole".
+[[nodiscard]] const char* WordOf(Contact::Kind kind);
+
 /// What acts along one scalar coordinate q of a joint or a bushing or along the length q of a
 /// distance drive; its force is positive as a drive's there, exerted by the joint's parent on its
 /// child. Parts of the reactions are these forces no more than drive forces are.
@@ -325,6 +348,12 @@ struct ForceElement {
   int drive = -1;                  ///< … the distance drive, or …
   int bushing = -1;                ///< … `coordinate` of this one
   std::variant<DampingLaw, SpringLaw, RotorLaw, FrictionLaw> law;
+};
+
+/// What becomes of bodies in a robot's file that nothing ties to the world.
+struct FloatingBase {
+  std::string held = {};  ///< the body that is held; "": of those that hang together one, the root
+  bool free = false;      ///< none is held: a free joint carries it
 };
 
 struct Mechanism {
@@ -352,6 +381,7 @@ struct Mechanism {
   std::vector<Bushing> bushings;
   std::vector<ForceElement> elements;
   std::vector<Motor> motors;  ///< at most one per drive; no witness reads them
+  std::vector<Contact> contacts;
   std::vector<Beam> beams;    ///< of the elastic bodies; empty in most models
 
   std::vector<int> tree_joints;     ///< indices of the spanning tree's joints, parents first (every

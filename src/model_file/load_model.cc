@@ -18,6 +18,7 @@
 #include "model_file/load_bodies.h"
 #include "model_file/model_bodies.h"
 #include "model_file/model_checks.h"
+#include "model_file/model_contacts.h"
 #include "model_file/model_drives.h"
 #include "model_file/model_elements.h"
 #include "model_file/model_instances.h"
@@ -170,7 +171,7 @@ const std::vector<std::string> kModelKeys = {
     "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
     "urdf",   "attach",      "up",         "materials", "sections", "parameters_from", "allow",
     "closure_tolerance", "closure_tolerance_mm", "couplings", "motors", "elements",
-    "legs",   "license",     "left_out",   "symbols"};
+    "legs",   "license",     "left_out",   "symbols",   "contacts"};
 // clang-format on
 
 // Reads what needs no parameter.
@@ -551,6 +552,7 @@ struct ModelSections {
   std::vector<Bushing> bushings;
   std::vector<ForceElement> elements;
   internal::ModelBeams beams;
+  std::vector<internal::ContactPlan> contacts;
   internal::UrdfSection urdf;
 };
 
@@ -623,6 +625,23 @@ void ReadMotors(const Block& model, YamlReader* yaml, ModelSections* s) {
   internal::ReadMotors(model, s->drives, s->joints.joints, &values, &s->motors);
 }
 
+// Of the file, then those of --plant, each with findings of its own.
+template <typename EachBlock>
+void ReadContacts(const EachBlock& each_block, const Block& model, const internal::BodyNames& names,
+                  internal::ModelValues* values, Reading* reading, ModelSections* s) {
+  const auto& holding = reading->options.holding;
+  internal::ContactReader contacts(values, names, holding, &s->joints, &s->contacts);
+  each_block([&](const Block& block) { contacts.Read(block); });
+  for (const std::string& plant : reading->options.plants) {
+    YamlReader yaml("--plant " + plant);
+    internal::ModelValues own(&yaml, &reading->literals);
+    const internal::BodyNames own_names(s->bodies, &own);
+    internal::ContactReader(&own, own_names, holding, &s->joints, &s->contacts)
+        .ReadOption(model, plant);
+    reading->others.Append(yaml.diagnostics());
+  }
+}
+
 // Empty after a finding that leaves nothing to read.
 std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   YamlReader& yaml = reading->yaml;
@@ -662,7 +681,9 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   each_block([&](const Block& block) { joints.Read(block); });
   ReadSignals(each_block, names, &values, &s);
   ReadElastic(each_block, names, &values, &s);
-  urdf.HoldBase(s.urdf.root, reading->options.base, s.bodies, &s.joints);
+  urdf.HoldBase(s.urdf.root, {.held = reading->options.base, .free = reading->options.free_base},
+                s.bodies, &s.joints);
+  ReadContacts(each_block, blocks.model(), names, &values, reading, &s);
   internal::OrderDrives(root, &yaml, &s.drives);
   internal::ReadSymbols(root, &yaml, &s.drives);
   ReadMotors(blocks.model(), &yaml, &s);
@@ -729,6 +750,9 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
   internal::CheckHome(*mechanism, &report);
   internal::CheckIsostaticRule(*mechanism, &report);
   internal::CheckPlausible(*mechanism, &report);
+  for (const internal::ContactFinding& finding : internal::PlantContacts(s.contacts, mechanism)) {
+    report.At(finding.place, Severity::kError, finding.message, finding.hint);
+  }
 }
 
 // What was found, in the order of the file.

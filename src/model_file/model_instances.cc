@@ -212,7 +212,7 @@ namespace {
 const std::vector<std::string> kPartKeys = {"parameters", "attach",      "bodies",    "joints",
                                             "drives",     "prescribed",  "outputs",   "springs",
                                             "instances",  "description", "materials", "sections",
-                                            "couplings",  "elements",    "legs"};
+                                            "couplings",  "elements",    "legs",      "contacts"};
 
 }  // namespace
 

@@ -476,9 +476,10 @@ void UrdfReader::AddExtras(const UrdfTree& tree, const Into& into) {
   }
 }
 
-void UrdfReader::HoldBase(int root, const std::string& base, const ModelBodies& bodies,
+void UrdfReader::HoldBase(int root, const FloatingBase& wanted, const ModelBodies& bodies,
                           ModelJoints* joints) {
   if (root < 0) return;
+  const std::string& base = wanted.held;
   const auto name_of = [&](int body) { return bodies.bodies[static_cast<size_t>(body)].name; };
   const auto refuse = [&](const std::string& text, const std::string& hint) {
     others_.Add({Severity::kError, values_.yaml().file(), 0, 0, text, hint});
@@ -517,6 +518,13 @@ void UrdfReader::HoldBase(int root, const std::string& base, const ModelBodies& 
   }
   if (!floats) return;
   Joint weld;
+  if (wanted.free && bare_) {
+    weld.name = name_of(root) + ".free";
+    weld.kind = JointKind::kFree;
+    weld.child = root;
+    joints->Add(std::move(weld), {}, std::nullopt);
+    return;
+  }
   weld.name = name_of(held) + ".weld";
   weld.child = held;
   weld.X_PF = X_WB;

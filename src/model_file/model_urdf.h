@@ -46,7 +46,7 @@ class UrdfReader {
 
   /// Fixes the root link, or of a bare URDF the link `base` where joints at their guesses have it,
   /// to the world, unless a joint of the model file carries the root.
-  void HoldBase(int root, const std::string& base, const ModelBodies& bodies, ModelJoints* joints);
+  void HoldBase(int root, const FloatingBase& base, const ModelBodies& bodies, ModelJoints* joints);
 
  private:
   /// The tree as the file and the closure file have it, links that are frames folded.

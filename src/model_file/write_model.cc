@@ -12,6 +12,7 @@
 #include "mechanism/reach.h"
 #include "model_file/element_text.h"
 #include "model_file/mesh/read_mesh.h"
+#include "model_file/model_contacts.h"
 #include "model_file/model_drives.h"
 
 namespace mbv {
@@ -180,6 +181,11 @@ class ModelWriter {
     for (size_t j = 0; j < m_.joints.size(); ++j) {
       const Joint& joint = m_.joints[j];
       const std::string& name = names_.joints[j];
+      if (std::ranges::any_of(m_.contacts, [&](const Contact& contact) {
+            return contact.joint == static_cast<int>(j);
+          })) {
+        continue;  // it is written as a contact
+      }
       text += fmt::format("  {}: {{kind: {}, parent: {}, child: {}", name, WordOf(joint.kind),
                           Ref(joint.parent, joint.X_PF, name + "_F"),
                           Ref(joint.child, joint.X_CM, name + "_M"));
@@ -279,12 +285,28 @@ class ModelWriter {
           PointRef(s.body_from, s.p_from, name + "_from"),
           PointRef(s.body_to, s.p_to, name + "_to"), s.stiffness, s.damping, s.free_length_m);
     }
+    text += Contacts();
     if (!m_.motors.empty()) text += "motors:\n";
     for (const Motor& motor : m_.motors) {
       text += fmt::format("  {}: {{{}}}\n", names_.drives[static_cast<size_t>(motor.drive)],
                           internal::MotorText(motor));
     }
     return text;
+  }
+
+  // Feet that hold, where they are on the ground.
+  std::string Contacts() {
+    std::string text;
+    for (const Contact& contact : m_.contacts) {
+      if (contact.joint < 0) continue;
+      const Joint& joint = m_.joints[static_cast<size_t>(contact.joint)];
+      const std::string& name = names_.joints[static_cast<size_t>(contact.joint)];
+      text += fmt::format("  {}: {{on: {}, to: {}, {}}}\n", name,
+                          Ref(joint.child, joint.X_CM, name + "_foot"),
+                          Ref(joint.parent, joint.X_PF, name + "_ground"),
+                          internal::ContactText(contact));
+    }
+    return text.empty() ? "" : "contacts:\n" + text;
   }
 
   std::string Written(size_t b, std::set<std::string>* taken) {

@@ -8,6 +8,7 @@
 #include "base/markup.h"
 #include "base/sha256.h"
 #include "plot/svg_plot.h"
+#include "report/contacts.h"
 #include "report/html_assets.h"
 #include "report/load_figures.h"
 #include "report/motion_tables.h"
@@ -273,6 +274,7 @@ class PageWriter {
     page_.Add(DriveSection(report_));
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     page_.Add("Motors", "Motors", SizingHtml(report_));
+    page_.Add(ContactSection(report_));
     page_.Add(EngineSection(report_));
     if (report_.source_model != nullptr) {
       page_.Add(SourceModelSection(*report_.source_model, false));

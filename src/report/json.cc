@@ -1,6 +1,7 @@
 #include "report/json.h"
 
 #include "base/json_text.h"
+#include "report/contacts.h"
 #include "report/load_figures.h"
 #include "report/motion_tables.h"
 #include "report/report.h"
@@ -255,6 +256,7 @@ std::string ToJson(const Report& report) {
   if (report.source_model != nullptr) json["source_model"] = SourceModelJson(*report.source_model);
   json["loads"] = LoadsJson(report);
   if (!report.motors.empty()) json["motors"] = SizingJson(report);
+  if (!report.contact_loads.empty()) json["contacts"] = ContactsJson(report);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);
   json["pictures"] = report.pictures;

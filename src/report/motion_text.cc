@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/contacts.h"
 #include "report/html_report.h"
 #include "report/motion_tables.h"
 #include "report/page.h"
@@ -33,6 +34,7 @@ class VerdictTableWriter {
     out_.Add(ReferenceTableSection(report, out_.verbose()));
     out_.Add(MotionTableSection(report, out_.verbose()));
     AddLines(SizingLines(report, out_.sizing() || out_.verbose()));
+    out_.Add(ContactSection(report));
     out_.Add(DriveSection(report));
     out_.Add(EngineSection(report));
     if (report.source_model != nullptr) {

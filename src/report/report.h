@@ -11,6 +11,7 @@
 
 #include "base/run_summary.h"
 #include "comparison/comparison.h"
+#include "comparison/contact_load.h"
 #include "comparison/motor_load.h"
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
@@ -93,6 +94,7 @@ struct Report : ResultFrame {
   std::vector<SmoothedForce> smoothed_forces;  ///< empty where none is smoothed
   std::vector<Motor> motors;                   ///< of the model
   std::vector<MotorLoad> motor_loads;          ///< by witness that ran, then by motor
+  std::vector<ContactLoad> contact_loads;      ///< by witness that ran, then by contact, then all
   std::optional<EngineComparison> engine_comparison;
   std::shared_ptr<const SourceModelAudit> source_model;  ///< of a robot's MJCF; null without one
   std::vector<std::string> pictures;                     ///< file names below snapshots/

@@ -40,7 +40,7 @@ constexpr double kMostTableSteps = 2e5;  // no smaller step is taken than that g
 const std::vector<std::string> kMotionScenarioKeys = {
     "kind",      "mechanism", "description", "parameters", "gravity",    "motion",
     "loads",     "forces",    "analytic",    "reference",  "simulation", "checks",
-    "snapshots", "expect",    "witnesses",   "figures"};
+    "snapshots", "expect",    "witnesses",   "figures",    "contacts"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -93,6 +93,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     if (const YamlNode* gravity = map.Find("gravity")) {
       scenario_.gravity_W = values_.Vector(*gravity, "gravity");
     }
+    ReadHolding(map.Find("contacts"));
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     // Numbers from here on may be expressions of the model's parameters.
     scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
@@ -105,6 +106,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
     scenario_.figures = ReadFigures(&values_, map.Find("figures"));
     if (!mechanism_) return;
+    CheckHolding(map.Find("contacts"));
     UsePlainNames();
     const MotionTimes times = ReadTable(map.Find("reference"));
     const YamlNode* motion = map.Required("motion");
@@ -118,6 +120,31 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     CheckParameterNames(map);
     if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
     if (!yaml_.has_errors()) CheckDriveMode(*motion, map.Find("simulation"));
+  }
+
+  // Feet that stand on the ground in this scenario.
+  void ReadHolding(const YamlNode* node) {
+    if (node == nullptr) return;
+    const auto items = yaml_.Items(*node, "contacts");
+    if (!items) return;
+    scenario_.holding.emplace();
+    for (size_t k = 0; k < items->size(); ++k) {
+      const auto name = yaml_.Text(*(*items)[k], fmt::format("contacts[{}]", k));
+      if (name) scenario_.holding->push_back(*name);
+    }
+  }
+
+  void CheckHolding(const YamlNode* node) {
+    if (node == nullptr || !scenario_.holding) return;
+    std::vector<std::string> names;
+    for (const Contact& contact : mechanism_->contacts) names.push_back(contact.name);
+    for (const YamlNodePtr& item : node->items) {
+      if (!item->is_scalar() || Contains(names, item->text)) continue;
+      yaml_.Error(*item,
+                  fmt::format("contacts: {} has no contact '{}'", mechanism_->name, item->text),
+                  names.empty() ? "the model describes its feet under contacts"
+                                : DidYouMean(item->text, names));
+    }
   }
 
   // Of another kind, nothing else in the file is of use here.
@@ -400,6 +427,7 @@ LoadOptions ModelOptions(const Scenario& scenario, const Overrides& more) {
   options.overrides = Merge(scenario.parameters, more);
   options.override_places = scenario.parameter_places;
   options.gravity_W = scenario.gravity_W;
+  options.holding = scenario.holding;
   return options;
 }
 
@@ -613,7 +641,7 @@ LoadResult ScenarioMemory::Load(const std::string& model_file, const LoadOptions
   };
   const bool same = model_.mechanism && model_file_ == model_file &&
                     std::ranges::equal(options_.overrides, options.overrides, same_override) &&
-                    options_.gravity_W == options.gravity_W;
+                    options_.gravity_W == options.gravity_W && options_.holding == options.holding;
   if (same) return model_;
   rank_.reset();
   const auto known = texts_.find(model_file);

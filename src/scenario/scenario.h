@@ -137,6 +137,7 @@ struct Scenario {
   Overrides parameters;                             ///< for all witnesses
   std::map<std::string, Finding> parameter_places;  ///< where each override was written
   std::optional<Vec3> gravity_W;                    ///< instead of the model's [m/s²]
+  std::optional<std::vector<std::string>> holding;  ///< contacts that hold; empty: all
   Motion motion;
   /// Samples before this time are left out of the force metrics; 0 unless the file names it.
   double start_window_s = 0.0;

@@ -34,7 +34,7 @@ bool IsForeign(const std::string& file) {
 }
 
 ForeignModel AnswerOfMjcf(const std::string& text, const std::string& file,
-                          const std::string& base) {
+                          const FloatingBase& base) {
   Diagnostics findings;
   auto read = ReadMjcf(text, file, base, &findings);
   if (!read) return {.findings = findings.findings(), .model = "", .left_out = {}, .printed = {}};
@@ -45,7 +45,7 @@ ForeignModel AnswerOfMjcf(const std::string& text, const std::string& file,
 }
 
 ForeignModel ReadInChild(const std::string& text, const std::string& file,
-                         const std::string& base) {
+                         const FloatingBase& base) {
   constexpr double kTimeout_s = 60.0;
   const auto answers =
       InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(AnswerOfMjcf(text, file, base)); });
@@ -59,7 +59,7 @@ ForeignModel ReadInChild(const std::string& text, const std::string& file,
 }
 
 // The model that an MJCF or SDF file stands for, empty after errors, and what it leaves out.
-std::optional<ForeignModel> ModelOf(const std::string& file, const std::string& base,
+std::optional<ForeignModel> ModelOf(const std::string& file, const FloatingBase& base,
                                     Diagnostics* findings) {
   if (IsXacro(file)) {
     findings->AddError(file, "a xacro file is no robot yet", XacroHint(file));
@@ -84,7 +84,7 @@ void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
 
 LoadResult LoadForeign(const std::string& file, const LoadOptions& options) {
   LoadResult result;
-  auto answer = ModelOf(file, options.base, &result.diagnostics);
+  auto answer = ModelOf(file, {.held = options.base, .free = options.free_base}, &result.diagnostics);
   if (!answer) return result;
   LoadOptions of_text = options;
   of_text.printed = answer->printed;
@@ -102,7 +102,7 @@ LoadResult LoadForeign(const std::string& file, const LoadOptions& options) {
 LoadedBodies LoadRobotBodies(const std::string& file) {
   if (!IsForeign(file)) return LoadBodies(file);
   LoadedBodies result;
-  const auto answer = ModelOf(file, "", &result.diagnostics);
+  const auto answer = ModelOf(file, {}, &result.diagnostics);
   if (!answer) return result;
   LoadedBodies loaded = LoadBodiesText(answer->model, file);
   AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);

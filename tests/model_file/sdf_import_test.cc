@@ -34,7 +34,7 @@ struct Read {
 };
 
 Read ReadFile(const std::string& file, const std::string& text, const std::string& base = "") {
-  const ForeignModel model = ReadSdf(text, file, base);
+  const ForeignModel model = ReadSdf(text, file, {.held = base});
   Read read{.mechanism = {}, .left_out = model.left_out, .text = {}};
   Diagnostics found;
   for (const Finding& finding : model.findings) found.Add(finding);

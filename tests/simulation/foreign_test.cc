@@ -51,7 +51,7 @@ struct Read {
 };
 Read ReadText(const std::string& text) {
   Read read;
-  read.model = ReadMjcf(text, "arm.xml", "", &read.diagnostics);
+  read.model = ReadMjcf(text, "arm.xml", {}, &read.diagnostics);
   return read;
 }
 
@@ -510,7 +510,7 @@ TEST(ForeignMjcf, AttachedModelsKeepTheirClassesUnitsAndKeyframes) {
                "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   const auto read_in = [&](const std::string& text) {
     Read read;
-    read.model = ReadMjcf(text, folder.Write("arm.xml", text), "", &read.diagnostics);
+    read.model = ReadMjcf(text, folder.Write("arm.xml", text), {}, &read.diagnostics);
     return read;
   };
   const Read attached = read_in(WithHand("<attach model='hand' body='palm' prefix='l_'/>"));
@@ -643,7 +643,7 @@ TEST(ForeignMjcf, OptionsOfAttachedModelsAreMergedWhereTheModelSaysSo) {
                              "<asset><model file='hand.xml'/></asset><worldbody>"
                              "<attach model='hand' prefix=''/></worldbody></mujoco>";
     Diagnostics diagnostics;
-    const auto model = ReadMjcf(text, folder.Write("arm.xml", text), "", &diagnostics);
+    const auto model = ReadMjcf(text, folder.Write("arm.xml", text), {}, &diagnostics);
     return model ? std::pair(model->mechanism.gravity_W.z(), model->mechanism.elements.size())
                  : std::pair(0.0, size_t{0});
   };

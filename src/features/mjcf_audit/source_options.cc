@@ -120,7 +120,7 @@ class SourceModelMaker {
     std::vector<std::string> warnings;
     const EngineSession session(&warnings);
     Diagnostics findings;
-    auto imported = ImportMjcf(task_.text, task_.file, task_.base, warnings, &findings);
+    auto imported = ImportMjcf(task_.text, task_.file, {.held = task_.base}, warnings, &findings);
     if (!imported) return Unsupported("the file was refused: " + findings.Text());
     imported_ = &*imported;
     if (RunSummary summary = FindDrives(*imported->model); !summary.ok()) return summary;

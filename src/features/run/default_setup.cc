@@ -8,6 +8,8 @@
 #include "base/text.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
+#include "kinematics/mobility.h"
+#include "mechanism/followed_state.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/reach.h"
 #include "model_file/write_model.h"
@@ -20,6 +22,16 @@ namespace {
 
 constexpr size_t kMostNames = 6;
 
+bool StandsOnFeet(const Mechanism& m) {
+  return std::ranges::any_of(m.contacts, [](const Contact& contact) { return contact.joint >= 0; });
+}
+
+bool IsContact(const Mechanism& m, size_t joint) {
+  return std::ranges::any_of(m.contacts, [joint](const Contact& contact) {
+    return contact.joint == static_cast<int>(joint);
+  });
+}
+
 // The drives' coordinates, then all others that can be driven.
 std::vector<Coordinate> Candidates(const Mechanism& m) {
   std::vector<Coordinate> candidates;
@@ -27,8 +39,8 @@ std::vector<Coordinate> Candidates(const Mechanism& m) {
     candidates.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
   }
   for (size_t j = 0; j < m.joints.size(); ++j) {
-    if (m.joints[j].kind == JointKind::kFree)
-      continue;  // nothing is there that a drive could act on
+    // Nothing is there that a drive could act on.
+    if (m.joints[j].kind == JointKind::kFree || IsContact(m, j)) continue;
     for (int c = 0; c < DofsOf(m.joints[j].kind); ++c) {
       const bool driven = std::any_of(m.drives.begin(), m.drives.end(), [&](const Drive& drive) {
         const auto* on = std::get_if<JointDrive>(&drive.kind);
@@ -177,6 +189,46 @@ void AddOutputs(Mechanism* m) {
   }
 }
 
+// The bodies that float but for their feet: what a motion of a robot on its feet is about.
+void AddBases(Mechanism* m) {
+  if (!StandsOnFeet(*m)) return;
+  for (const Joint& joint : m->joints) {
+    if (joint.kind != JointKind::kFree || joint.parent != 0) continue;
+    const bool known = std::ranges::any_of(
+        m->outputs, [&](const Output& output) { return output.body == joint.child; });
+    if (known) continue;
+    m->outputs.push_back({.name = m->bodies[static_cast<size_t>(joint.child)].name,
+                          .body = joint.child,
+                          .X_BO = Pose::Identity(),
+                          .reference_body = 0,
+                          .X_RbR = Pose::Identity()});
+  }
+}
+
+// What a first motion commands: the drives, or, where feet make them depend on each other, the
+// bases and what these leave free.
+std::vector<Coordinate> Commanded(const Mechanism& m, bool by_forces) {
+  std::vector<Coordinate> drives, candidates;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    drives.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
+  }
+  if (!StandsOnFeet(m)) return drives;
+  for (size_t o = 0; o < m.outputs.size() && !by_forces; ++o) {
+    const bool floats = std::ranges::any_of(m.joints, [&](const Joint& joint) {
+      return joint.kind == JointKind::kFree && joint.child == m.outputs[o].body;
+    });
+    for (int c = 0; c < 6 && floats; ++c) {
+      candidates.push_back({Coordinate::Kind::kOutput, static_cast<int>(o), c});
+    }
+  }
+  candidates.insert(candidates.end(), drives.begin(), drives.end());
+  std::vector<Coordinate> chosen;
+  for (const size_t k : ChooseCoordinates(m, candidates, candidates.size()).chosen) {
+    chosen.push_back(candidates[k]);
+  }
+  return chosen;
+}
+
 // How fast the bodies are against the drives.
 double Quickness(const Mechanism& m, const ReferenceSample& sample, double length) {
   double fastest = 0.0;
@@ -193,16 +245,22 @@ double Quickness(const Mechanism& m, const ReferenceSample& sample, double lengt
 
 class MotionSearch {
  public:
-  MotionSearch(const Mechanism& m, const std::vector<std::string>& resting)
+  MotionSearch(const Mechanism& m, const std::vector<Coordinate>& commanded,
+               const std::vector<std::string>& resting)
       : m_(m), length_(CharacteristicLength(m)) {
     BodyStates home;
     home.Resize(m.bodies.size());
     home.X_WB = m.X_WB_home;
     motion_.beyond_ranges = !IsWithinRanges(m, m.X_WB_home);
     motion_.duration_s = 1.0;
-    for (size_t d = 0; d < m.drives.size(); ++d) {
+    motion_.coordinates = commanded;
+    for (const Coordinate& coordinate : commanded) {
+      const auto d = static_cast<size_t>(coordinate.index);
       motion_.strokes.push_back(
-          FullStroke(d, DriveRow(m, m.drives[d], home).value, Contains(resting, m.drives[d].name)));
+          coordinate.kind == Coordinate::Kind::kDrive
+              ? FullStroke(d, DriveRow(m, m.drives[d], home).value,
+                           Contains(resting, m.drives[d].name))
+              : StrokeOfBase(coordinate));
     }
   }
 
@@ -231,6 +289,16 @@ class MotionSearch {
  private:
   static constexpr double kMostQuicker = 3.0;
 
+  // Small enough for stretched knees; down, where they cannot stretch further.
+  DriveStroke StrokeOfBase(const Coordinate& coordinate) const {
+    constexpr double kDown = -0.03, kAcross = 0.015, kTurn = 0.03;  // lengths, rad
+    const int c = coordinate.component;
+    return {.home = HomeValue(m_, coordinate),
+            .height = c == 2 ? kDown * length_ : c < 2 ? kAcross * length_ : kTurn,
+            .start_s = 0.05 * static_cast<double>(c % 4),
+            .duration_s = motion_.duration_s - 0.2};
+  }
+
   DriveStroke FullStroke(size_t d, double home, bool rests) const {
     const Drive& drive = m_.drives[d];
     DriveStroke stroke{.home = home, .height = 0.0};
@@ -248,12 +316,12 @@ class MotionSearch {
 
   Motion Commands() const {
     Motion motion{.duration_s = motion_.duration_s, .sample_s = 0.02, .commands = {}, .loads = {}};
-    for (size_t d = 0; d < m_.drives.size(); ++d) {
-      const DriveStroke& stroke = motion_.strokes[d];
+    for (size_t k = 0; k < motion_.coordinates.size(); ++k) {
+      const DriveStroke& stroke = motion_.strokes[k];
       Profile profile{{ConstantTerm{stroke.home}}};
       profile.terms.emplace_back(BumpTerm{stroke.start_s, stroke.duration_s, stroke.height});
-      const Coordinate coordinate{Coordinate::Kind::kDrive, static_cast<int>(d), 0};
-      motion.commands.push_back({m_.drives[d].name, {{coordinate, 1.0}}, profile});
+      const Coordinate& coordinate = motion_.coordinates[k];
+      motion.commands.push_back({NameOf(m_, coordinate), {{coordinate, 1.0}}, profile});
     }
     return motion;
   }
@@ -285,22 +353,31 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
                          const std::string& model_ref, const std::vector<std::string>& notes,
                          const std::vector<Coordinate>& by_forces, bool holding) {
   const WrittenNames names = NamesInModel(m);
-  std::string text =
-      "# A first motion, made by mbverify: each drive goes out and back again.\n"
-      "# All keys: docs/reference/scenario_file.md.\n";
+  std::string text = fmt::format(
+      "# A first motion, made by mbverify: {} out and back again.\n"
+      "# All keys: docs/reference/scenario_file.md.\n",
+      StandsOnFeet(m) ? "the base and the drives that it leaves free go" : "each drive goes");
   for (const std::string& note : notes) text += "# " + note + "\n";
   text += fmt::format(
-      "mechanism: {}\ndescription: Each drive out and back, from rest to rest\nmotion:\n"
+      "mechanism: {}\ndescription: {} out and back, from rest to rest\nmotion:\n"
       "  duration_s: {}\n  sample_s: 0.01\n{}",
-      QuotedYaml(model_ref), motion.duration_s, m.drives.empty() ? "" : "  commands:\n");
-  for (size_t d = 0; d < m.drives.size(); ++d) {
-    const DriveStroke& stroke = motion.strokes[d];
+      QuotedYaml(model_ref), StandsOnFeet(m) ? "On its feet, the base" : "Each drive",
+      motion.duration_s, motion.coordinates.empty() ? "" : "  commands:\n");
+  for (size_t k = 0; k < motion.coordinates.size(); ++k) {
+    const DriveStroke& stroke = motion.strokes[k];
+    const Coordinate& coordinate = motion.coordinates[k];
+    const auto index = static_cast<size_t>(coordinate.index);
+    const std::string name =
+        coordinate.kind == Coordinate::Kind::kDrive
+            ? names.drives[index]
+            : fmt::format("{}.{}", names.outputs[index],
+                          kPoseComponents.at(static_cast<size_t>(coordinate.component)));
     if (stroke.height == 0.0) {
-      text += fmt::format("    {}: home\n", names.drives[d]);
+      text += fmt::format("    {}: home\n", name);
     } else {
       text += fmt::format(
           "    {}: [home, {{bump: {{start_s: {:g}, duration_s: {:g}, height: {:.6g}}}}}]\n",
-          names.drives[d], stroke.start_s, stroke.duration_s, stroke.height);
+          name, stroke.start_s, stroke.duration_s, stroke.height);
     }
   }
   if (!by_forces.empty()) {
@@ -344,7 +421,8 @@ Mechanism WithDriveForEachDof(const Mechanism& mechanism, std::vector<std::strin
   std::vector<Drive> drives;
   std::vector<std::string> dropped, added;
   for (size_t d = 0; d < m.drives.size(); ++d) {
-    if (std::find(choice.dependent.begin(), choice.dependent.end(), d) == choice.dependent.end()) {
+    if (StandsOnFeet(m) ||
+        std::find(choice.dependent.begin(), choice.dependent.end(), d) == choice.dependent.end()) {
       drives.push_back(m.drives[d]);
     } else {
       dropped.push_back(m.drives[d].name);
@@ -371,7 +449,8 @@ Mechanism WithDriveForEachDof(const Mechanism& mechanism, std::vector<std::strin
 
 FirstMotion FindFirstMotion(const Mechanism& mechanism, const std::vector<std::string>& resting) {
   const Mechanism held = WithTurnsHeld(mechanism);
-  return MotionSearch(held, resting).Run();
+  const bool by_forces = CountDofs(held) != CountDofs(mechanism);
+  return MotionSearch(held, Commanded(held, by_forces), resting).Run();
 }
 
 DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
@@ -394,6 +473,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   caveats.insert(caveats.end(), loaded.caveats.begin(), loaded.caveats.end());
   setup.by_forces = static_cast<int>(by_forces.size());
   if (setup.by_forces > 0) AddOutputs(&m);
+  AddBases(&m);
   if (!name.empty()) m.name = name;
   const bool has_mass =
       std::ranges::any_of(m.bodies, [](const Body& body) { return body.mass > 0.0; });

@@ -14,7 +14,7 @@
 namespace mbv {
 
 /// Gives every DOF of a mechanism one drive. Drives that depend on others are left
-/// out, and DOFs that none of them holds get drives on joints, chosen by rank. Idle
+/// out unless feet on the ground make them dependent, and DOFs that none of them holds get drives on joints, chosen by rank. Idle
 /// spins need none. Rotations of balls that no drive on a joint can hold, such as spins that are
 /// not idle, move by forces: `by_forces` gets coordinates for them. What was done is reported in
 /// `notes`.
@@ -27,9 +27,11 @@ struct DriveStroke {
   double height = 0.0;  ///< of its bump; 0: it rests
   double start_s = 0.0, duration_s = 1.0;
 };
-/// A motion from rest to rest: each drive goes out and back again.
+/// A motion from rest to rest: each drive goes out and back again. Of a robot on its feet, whose
+/// drives depend on each other, the base does, and the drives that this leaves free.
 struct FirstMotion {
-  std::vector<DriveStroke> strokes;  ///< per drive
+  std::vector<Coordinate> coordinates;  ///< that are commanded
+  std::vector<DriveStroke> strokes;     ///< of each
   double duration_s = 1.0;
   bool found = false;          ///< the loops stay closed on it, away from singular poses
   bool beyond_ranges = false;  ///< home itself is out of range

@@ -189,7 +189,10 @@ int Run(const RunArguments& arguments) {
   for (const std::string& given : files) {
     std::string file = given;
     options.source_base = arguments.robot.base;
-    options.source_model = given.ends_with(".xml") && !arguments.no_source_model ? given : "";
+    // On its feet it is another mechanism than the file, whose contacts are MuJoCo's.
+    const bool floats = arguments.robot.free_base || !arguments.robot.plants.empty();
+    options.source_model =
+        given.ends_with(".xml") && !arguments.no_source_model && !floats ? given : "";
     if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
       exit_code = WorseExit(exit_code, 2);
       counts += RunCounts{.scenarios = 1, .bad_input = 1};

@@ -409,6 +409,7 @@ class ScenarioRun {
     if (!other_engines_.empty()) CompareEngines(input);
     report_.witnesses = std::move(runs_.records);
     SizeMotors();
+    LoadContacts();
   }
 
   // Where an integrated simulation alone disagrees: is it the mechanism or the step? The same run
@@ -482,6 +483,17 @@ class ScenarioRun {
         load.witness = record.name;
         load.unresolved = unresolved;
         if (load.known()) report_.motor_loads.push_back(std::move(load));
+      }
+    }
+  }
+
+  void LoadContacts() {
+    for (const WitnessRecord& record : report_.witnesses) {
+      if (!record.summary.ok() || record.trace.time_s.empty()) continue;
+      for (ContactLoad& load :
+           ContactLoadsOf(base(), record.trace, report_.reactions_not_unique)) {
+        load.witness = record.name;
+        report_.contact_loads.push_back(std::move(load));
       }
     }
   }

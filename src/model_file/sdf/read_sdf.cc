@@ -83,7 +83,7 @@ std::optional<ForeignModel> CallReader(const fs::path& reader, const SdfSource& 
 
 }  // namespace
 
-ForeignModel ReadSdf(const std::string& text, const std::string& file, const std::string& base) {
+ForeignModel ReadSdf(const std::string& text, const std::string& file, const FloatingBase& base) {
   Diagnostics found;
   ForeignModel model;
   auto source = InspectSdf(text, file, &found);

@@ -61,7 +61,7 @@ struct SdfSource {
   };
   std::string text, file;
   std::string folder;  ///< of the file, absolute
-  std::string base;    ///< the link that is to be held, by option
+  FloatingBase base;   ///< by option
   std::vector<Include> includes;
   std::vector<std::string> packages;  ///< name, folder, …: where meshes may be
   std::vector<std::string> motors;    ///< joints that plugins control
@@ -78,7 +78,8 @@ void VisitMembers(Visit& visit, typename Visit::template Of<SdfSource::Include>&
 }
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<SdfSource>& source) {
-  visit(source.text), visit(source.file), visit(source.folder), visit(source.base);
+  visit(source.text), visit(source.file), visit(source.folder);
+  visit(source.base.held), visit(source.base.free);
   visit(source.includes), visit(source.packages), visit(source.motors), visit(source.places);
   visit(source.left_out);
 }
@@ -88,8 +89,8 @@ void VisitMembers(Visit& visit, typename Visit::template Of<SdfSource>& source) 
 [[nodiscard]] std::optional<SdfSource> InspectSdf(const std::string& text, const std::string& file,
                                                   Diagnostics* diagnostics);
 
-/// The model that an SDF file stands for. `base`: as of LoadOptions.
+/// The model that an SDF file stands for.
 [[nodiscard]] ForeignModel ReadSdf(const std::string& text, const std::string& file,
-                                   const std::string& base);
+                                   const FloatingBase& base);
 
 }  // namespace mbv

@@ -634,17 +634,17 @@ class SdfImporter {
       std::ranges::replace(group, std::max(a, b), std::min(a, b));
     }
     int base = -1;
-    if (!source_.base.empty()) {
+    if (!source_.base.held.empty()) {
       const std::vector<std::string> names = NamesOf(m_.bodies);
-      const auto found = std::ranges::find(names.begin() + 1, names.end(), source_.base);
+      const auto found = std::ranges::find(names.begin() + 1, names.end(), source_.base.held);
       base = found == names.end() ? -1 : static_cast<int>(found - names.begin());
       if (base < 0) {
-        Error("", fmt::format("base {}: there is no link of this name", source_.base),
-              DidYouMean(source_.base, names));
+        Error("", fmt::format("base {}: there is no link of this name", source_.base.held),
+              DidYouMean(source_.base.held, names));
       } else if (group[static_cast<size_t>(base)] == 0) {
         Error("",
               fmt::format("base {}: the link does not float, joints hold it in the world",
-                          source_.base),
+                          source_.base.held),
               "only what nothing ties to the world needs a base");
       }
     }
@@ -661,13 +661,14 @@ class SdfImporter {
     std::vector<std::string> names;
     for (const auto& [g, b] : held) {
       Joint weld;
-      weld.name = m_.bodies[static_cast<size_t>(b)].name + "_held";
+      weld.name = m_.bodies[static_cast<size_t>(b)].name + (source_.base.free ? "_free" : "_held");
+      if (source_.base.free) weld.kind = JointKind::kFree;
       weld.child = b;
       weld.X_PF = X_WB(b);
       m_.joints.push_back(weld);
       names.push_back(m_.bodies[static_cast<size_t>(b)].name);
     }
-    if (!names.empty()) {
+    if (!names.empty() && !source_.base.free) {
       LeaveOut("floating", "",
                fmt::format("the freedom of {} in the world", Joined(names, kMostNames)));
     }

@@ -79,7 +79,7 @@ void AddJoint(int j, const Ends& ends, const Pose& X_PB, MjcfImport* in) {
       if (in->moves[static_cast<size_t>(j)]) {
         joint.kind = JointKind::kFree;
         joint.home = CoordinatesOf(joint, X_WB);
-        in->carried.push_back(body);
+        if (!Contains(in->floating, body)) in->carried.push_back(body);
       } else {
         joint.kind = JointKind::kFixed;
         joint.X_PF = X_WB;
@@ -179,19 +179,19 @@ void ChooseHeld(MjcfImport* in) {
   const std::vector<int> tied_to = TiedTo(*in);
   in->moves.assign(static_cast<size_t>(m.njnt), false);
   int base = -1;  // by option
-  if (!in->base.empty()) {
+  if (!in->base.held.empty()) {
     std::vector<std::string> names;
     for (int b = 1; b < m.nbody; ++b) {
       names.push_back(in->NameOf(mjOBJ_BODY, b, "body"));
-      if (names.back() == in->base) base = b;
+      if (names.back() == in->base.held) base = b;
     }
     if (base < 0) {
-      in->Refuse(fmt::format("base {}: there is no body of this name", in->base),
-                 DidYouMean(in->base, names));
+      in->Refuse(fmt::format("base {}: there is no body of this name", in->base.held),
+                 DidYouMean(in->base.held, names));
     } else if (tied_to[static_cast<size_t>(base)] == 0) {
       in->Refuse(fmt::format("base {}: the body does not float, its joints or loops hold it in the "
                              "world",
-                             in->base),
+                             in->base.held),
                  "only what hangs together on free joints needs a base");
       base = -1;
     }
@@ -201,7 +201,11 @@ void ChooseHeld(MjcfImport* in) {
     const int body = m.jnt_bodyid[j], first = tied_to[static_cast<size_t>(body)];
     const bool chosen = base >= 0 && tied_to[static_cast<size_t>(base)] == first;
     const int held = chosen ? m.body_rootid[base] : first;
-    in->moves[static_cast<size_t>(j)] = body != held;
+    in->moves[static_cast<size_t>(j)] = body != held || in->base.free;
+    // A tree of its own that no loop carries.
+    if (in->base.free && body == held && first != 0) {
+      in->floating.push_back(in->NameOf(mjOBJ_BODY, body, "body"));
+    }
     if (chosen && body == held && base != body) in->held_inside = base;
   }
 }

@@ -36,7 +36,7 @@ struct MjcfImport {
   const mjcf::ForeignMjcf& foreign;
   const std::string& file;
   Diagnostics* diagnostics;
-  const std::string& base;  ///< the body that is to be held, by option; "" leaves the choice
+  const FloatingBase& base;  ///< by option
 
   const mjtNum* qpos = nullptr;  ///< pose of the file: the first keyframe's, or the reference
   Mechanism mechanism = {};
@@ -52,7 +52,7 @@ struct MjcfImport {
   int held_inside = -1;
 
   // What the findings at the end report.
-  std::vector<std::string> held = {}, carried = {}, geared = {}, shifted = {}, moved = {};
+  std::vector<std::string> held = {}, carried = {}, floating = {}, geared = {}, shifted = {}, moved = {};
   std::vector<std::string> driving = {};  ///< joints whose damping is negative
   std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
   std::set<int> driven_tendons = {};      ///< between two sites, with a drive

@@ -24,7 +24,7 @@ ModelHandle Compile(mjcf::ForeignMjcf* foreign) {
   return model;
 }
 
-ImportedMjcf Import(mjcf::ForeignMjcf* source, const std::string& file, const std::string& base,
+ImportedMjcf Import(mjcf::ForeignMjcf* source, const std::string& file, const FloatingBase& base,
                     Diagnostics* diagnostics) {
   const mjcf::ForeignMjcf& foreign = *source;
   ImportedMjcf imported;
@@ -63,7 +63,7 @@ ImportedMjcf Import(mjcf::ForeignMjcf* source, const std::string& file, const st
 }  // namespace
 
 std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::string& file,
-                                       const std::string& base,
+                                       const FloatingBase& base,
                                        const std::vector<std::string>& warnings,
                                        Diagnostics* diagnostics) {
   mjcf::ForeignMjcf foreign(text, file, diagnostics);
@@ -90,7 +90,7 @@ std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::strin
 }  // namespace simulation
 
 std::optional<MjcfModel> ReadMjcf(const std::string& text, const std::string& file,
-                                  const std::string& base, Diagnostics* diagnostics) {
+                                  const FloatingBase& base, Diagnostics* diagnostics) {
   std::vector<std::string> warnings;
   const simulation::EngineSession session(&warnings);
   auto imported = simulation::ImportMjcf(text, file, base, warnings, diagnostics);

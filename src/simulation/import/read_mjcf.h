@@ -38,7 +38,7 @@ struct ImportedMjcf {
 /// as of ReadMjcf().
 [[nodiscard]] std::optional<ImportedMjcf> ImportMjcf(const std::string& text,
                                                      const std::string& file,
-                                                     const std::string& base,
+                                                     const FloatingBase& base,
                                                      const std::vector<std::string>& warnings,
                                                      Diagnostics* diagnostics);
 
@@ -54,9 +54,9 @@ struct MjcfModel {
   PrintedRounding printed;
 };
 
-/// Empty after errors. `base`: the floating body that is held; "": the first of those that hang
-/// together. MuJoCo's parser may crash on hostile files: call it in a process of its own.
+/// Empty after errors. Without a body to hold, the first of those that hang together is held.
+/// MuJoCo's parser may crash on hostile files: call it in a process of its own.
 [[nodiscard]] std::optional<MjcfModel> ReadMjcf(const std::string& text, const std::string& file,
-                                                const std::string& base, Diagnostics* diagnostics);
+                                                const FloatingBase& base, Diagnostics* diagnostics);
 
 }  // namespace mbv
