@@ -20,9 +20,9 @@ struct LoadOptions;  // model_file/load_model.h
 struct RobotArguments {
   std::vector<std::string> assembly;  ///< CLOSURE=N
   std::string base;                   ///< the body or link that is held
+  double closure_tolerance_m = kNan;  ///< NaN: what the digits of the file explain
   bool free_base = false;             ///< nothing is held
   std::vector<std::string> plants;    ///< feet on the ground, LoadOptions::plants
-  double closure_tolerance_m = kNan;  ///< NaN: what the digits of the file explain
 
   [[nodiscard]] bool any() const {
     return !assembly.empty() || !base.empty() || free_base || !plants.empty() ||

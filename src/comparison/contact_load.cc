@@ -63,9 +63,9 @@ struct Strength {
   bool bears_moment = false;  // about the normal: lines and soles
 };
 
-class Meter {
+class ContactMeter {
  public:
-  Meter(const std::vector<double>& time_s, double scale_N, ContactLoad* load)
+  ContactMeter(const std::vector<double>& time_s, double scale_N, ContactLoad* load)
       : time_s_(time_s), nothing_N_(kNothing * scale_N), load_(*load) {}
 
   void Measure(const Wrenches& wrenches, const Strength& strength) {
@@ -203,7 +203,7 @@ ContactLoad Together(const std::vector<Foot>& feet, const std::vector<Pose>& pla
   }
   if (outlined) load.outline = ConvexHull(std::move(corners));
   if (load.outline.size() < 3) load.outline.clear();
-  Meter(trace.time_s, scale_N, &load).Measure(sum, strength);
+  ContactMeter(trace.time_s, scale_N, &load).Measure(sum, strength);
   return load;
 }
 
@@ -245,7 +245,7 @@ std::vector<ContactLoad> ContactLoadsOf(const Mechanism& mechanism, const Trace&
                      .kind = WordOf(foot.contact->kind),
                      .witness = trace.witness,
                      .outline = foot.contact->outline};
-    Meter(trace.time_s, scale_N, &load)
+    ContactMeter(trace.time_s, scale_N, &load)
         .Measure(foot.wrenches, {.friction = foot.contact->friction,
                                  .torsion = foot.contact->torsion,
                                  .bears_moment = foot.contact->kind != Contact::Kind::kPoint});

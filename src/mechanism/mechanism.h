@@ -381,13 +381,14 @@ struct Mechanism {
   std::vector<Bushing> bushings;
   std::vector<ForceElement> elements;
   std::vector<Motor> motors;  ///< at most one per drive; no witness reads them
-  std::vector<Contact> contacts;
   std::vector<Beam> beams;    ///< of the elastic bodies; empty in most models
 
   std::vector<int> tree_joints;     ///< indices of the spanning tree's joints, parents first (every
                                     ///< non-world body is the outboard body of exactly one)
   std::vector<bool> tree_reversed;  ///< per tree joint: true if its child is the inboard body
   std::vector<Pose> X_WB_home;      ///< per body, the closed home pose
+
+  std::vector<Contact> contacts;  ///< of which some may be joints above
 
   [[nodiscard]] int FindBody(const std::string& body_name) const;  ///< index or -1
   [[nodiscard]] int FindJoint(const std::string& joint_name) const;

@@ -31,12 +31,6 @@ struct LoadOptions {
   /// The body or link of a robot that is held in the pose of its file; "": what hangs together is
   /// held at its root, where nothing ties it to the world. No model file has one.
   std::string base = {};
-  /// It is not held: a free joint carries it, and contacts may hold its feet.
-  bool free_base = false;
-  /// Contacts beside those of the file, as --plant takes them (internal::ContactReader).
-  std::vector<std::string> plants = {};
-  /// Names of the contacts that hold; empty: all of them.
-  std::optional<std::vector<std::string>> holding = {};
   /// Gap up to which rounded loops are closed [m], instead of what a model file states or the
   /// digits of a robot's file explain.
   double closure_tolerance_m = kNan;
@@ -44,6 +38,12 @@ struct LoadOptions {
   PrintedRounding printed = {};
   /// Other values of literals, by place.
   std::map<std::string, double> literals;
+  /// The base is not held: a free joint carries it, and contacts may hold its feet.
+  bool free_base = false;
+  /// Contacts beside those of the file, as --plant takes them (internal::ContactReader).
+  std::vector<std::string> plants = {};
+  /// Names of the contacts that hold; empty: all of them.
+  std::optional<std::vector<std::string>> holding = {};
 };
 
 /// Whether a file is a robot of a foreign format (.urdf, .xml, .sdf), by its name, or

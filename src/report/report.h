@@ -94,10 +94,10 @@ struct Report : ResultFrame {
   std::vector<SmoothedForce> smoothed_forces;  ///< empty where none is smoothed
   std::vector<Motor> motors;                   ///< of the model
   std::vector<MotorLoad> motor_loads;          ///< by witness that ran, then by motor
-  std::vector<ContactLoad> contact_loads;      ///< by witness that ran, then by contact, then all
   std::optional<EngineComparison> engine_comparison;
   std::shared_ptr<const SourceModelAudit> source_model;  ///< of a robot's MJCF; null without one
   std::vector<std::string> pictures;                     ///< file names below snapshots/
+  std::vector<ContactLoad> contact_loads;  ///< by witness that ran, then by contact, then all
 };
 
 /// summary.json.

@@ -375,6 +375,14 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     return hint;
   }
 
+  // Why the base of a robot floats.
+  [[nodiscard]] std::string FeetHint() const {
+    const std::vector<Contact>& contacts = mechanism_->contacts;
+    const bool lifted = std::ranges::all_of(
+        contacts, [](const Contact& contact) { return contact.joint < 0; });
+    return contacts.empty() || !lifted ? "" : "; contacts: all feet are lifted, so the base floats";
+  }
+
   // What would make the commands an independent set; "" where sums of coordinates are commanded.
   [[nodiscard]] std::string ChoiceHint() const {
     std::vector<Coordinate> candidates;
@@ -402,7 +410,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
                  "drives under motion.equal; what moves by forces needs motion.initial; not held "
                  "yet: {}",
                  JoinWords(rank.free_joints)) +
-             ChoiceHint() + SpinHint();
+             ChoiceHint() + SpinHint() + FeetHint();
     }
     std::string hint = "leave commands out: each further one contradicts the others";
     if (!rank.dependent.empty()) hint += "; " + JoinWords(DependentNames(rank)) + " are dependent";

@@ -137,7 +137,6 @@ struct Scenario {
   Overrides parameters;                             ///< for all witnesses
   std::map<std::string, Finding> parameter_places;  ///< where each override was written
   std::optional<Vec3> gravity_W;                    ///< instead of the model's [m/s²]
-  std::optional<std::vector<std::string>> holding;  ///< contacts that hold; empty: all
   Motion motion;
   /// Samples before this time are left out of the force metrics; 0 unless the file names it.
   double start_window_s = 0.0;
@@ -149,6 +148,7 @@ struct Scenario {
   SnapshotSettings snapshots;
   Expectation expect;
   std::vector<FigureSpec> figures;  ///< that its author composes
+  std::optional<std::vector<std::string>> holding;  ///< contacts that hold; empty: all
 };
 
 /// The sum of two override sets; `over` wins.
