@@ -42,10 +42,12 @@ void AddRobotOptions(CLI::App* command, RobotArguments* arguments) {
 }
 
 int RefuseRobotOptions() {
-  return Refuse("--assembly, --base, --free-base, --plant and --closure-tolerance are for robots (.urdf, .xml, "
-                ".sdf)",
-                "a model file says it itself: guesses of the joints, what is fixed to the world, "
-                "contacts, closure_tolerance");
+  return Refuse(
+      "--assembly, --base, --free-base, --plant and --closure-tolerance are for robots (.urdf, "
+      ".xml, "
+      ".sdf)",
+      "a model file says it itself: guesses of the joints, what is fixed to the world, "
+      "contacts, closure_tolerance");
 }
 
 bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options) {

@@ -35,7 +35,8 @@ void AddRobotOptions(CLI::App* command, RobotArguments* arguments);
 /// --closure-tolerance alone.
 void AddToleranceOption(CLI::App* command, double* tolerance_m);
 
-/// False after a message: --assembly is not CLOSURE=N, N from 1; --base with --free-base or --plant.
+/// False after a message: --assembly is not CLOSURE=N, N from 1; --base with --free-base or
+/// --plant.
 [[nodiscard]] bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options);
 
 // --json of the commands that print a result: the same for programs.

@@ -244,9 +244,8 @@ std::vector<Caveat> ContactCaveats(const ComparisonInput& input) {
          ContactLoadsOf(*input.mechanism, *witness.trace, input.reactions_not_unique)) {
       for (const ContactLoad::Use& use : load.uses) {
         if (!use.exceeded() || !known.emplace(load.contact, use.limit).second) continue;
-        caveats.push_back({.kind = CaveatKind::kContact,
-                           .of = {load.name()},
-                           .text = ExceededText(load, use)});
+        caveats.push_back(
+            {.kind = CaveatKind::kContact, .of = {load.name()}, .text = ExceededText(load, use)});
       }
     }
   }

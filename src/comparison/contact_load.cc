@@ -188,8 +188,8 @@ ContactLoad Together(const std::vector<Foot>& feet, const std::vector<Pose>& pla
     for (size_t i = 0; i < sum.size(); ++i) {
       const Vec3 f = places[k].linear() * feet[k].wrenches[i].head<3>();
       sum[i].head<3>() += f;
-      sum[i].tail<3>() += places[k].linear() * feet[k].wrenches[i].tail<3>() +
-                          places[k].translation().cross(f);
+      sum[i].tail<3>() +=
+          places[k].linear() * feet[k].wrenches[i].tail<3>() + places[k].translation().cross(f);
     }
     strength.friction = std::isnan(contact.friction) || std::isnan(strength.friction)
                             ? kNan
@@ -208,7 +208,8 @@ ContactLoad Together(const std::vector<Foot>& feet, const std::vector<Pose>& pla
 }
 
 std::string Since(const ContactLoad::Use& use) {
-  return use.beyond == 1 ? "" : fmt::format("; from {:.4g} s on, {} samples", use.from_s, use.beyond);
+  return use.beyond == 1 ? ""
+                         : fmt::format("; from {:.4g} s on, {} samples", use.from_s, use.beyond);
 }
 
 }  // namespace
@@ -278,15 +279,17 @@ std::string ExceededText(const ContactLoad& load, const ContactLoad::Use& use) {
       break;
     case Limit::kTwist:
       verb = "twist";
-      what = fmt::format("the moment about the normal has a lever of {:.4g} mm, torsion states {:.4g}",
-                         1e3 * use.worst, 1e3 * use.allowed);
+      what =
+          fmt::format("the moment about the normal has a lever of {:.4g} mm, torsion states {:.4g}",
+                      1e3 * use.worst, 1e3 * use.allowed);
       break;
   }
   return fmt::format("{} {}{}: {} at {:.4g} s{}{}", load.name(), verb,
                      load.contact.empty() ? "" : "s", what, use.time_s, Since(use),
-                     use.unique ? ""
-                                 : "; statics leaves open what the feet share, and this is one share "
-                                   "of many");
+                     use.unique
+                         ? ""
+                         : "; statics leaves open what the feet share, and this is one share "
+                           "of many");
 }
 
 }  // namespace mbv

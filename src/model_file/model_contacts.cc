@@ -10,8 +10,8 @@ namespace mbv::internal {
 namespace {
 
 const std::vector<std::string> kContactKeys = {
-    "on",       "at",      "kind",     "to",     "normal",    "axis",  "length",   "length_mm",
-    "width",    "width_mm", "outline", "outline_mm", "friction", "torsion", "torsion_mm"};
+    "on",    "at",       "kind",    "to",         "normal",   "axis",    "length",    "length_mm",
+    "width", "width_mm", "outline", "outline_mm", "friction", "torsion", "torsion_mm"};
 const std::vector<std::string> kContactWords = {"point", "line", "sole"};  // as Contact::Kind
 
 JointKind JointOf(Contact::Kind kind) {
@@ -182,7 +182,8 @@ bool ContactReader::ReadShape(const Block& block, const YamlMap& map, Contact* c
     if (given.node == nullptr) return std::optional<double>();
     const auto value = values_.Number(block, *given.node, map.PathOf(given.key), given.unit);
     if (!value || *value > 0.0) return value ? value : std::optional(kNan);
-    yaml.Error(*given.node, fmt::format("{} = {} violates {} > 0", map.PathOf(given.key), *value, key));
+    yaml.Error(*given.node,
+               fmt::format("{} = {} violates {} > 0", map.PathOf(given.key), *value, key));
     return std::optional(kNan);
   };
   const auto length = size("length"), width = size("width");
@@ -209,8 +210,8 @@ bool ContactReader::ReadShape(const Block& block, const YamlMap& map, Contact* c
     return true;
   }
   if (length.has_value() != width.has_value() || (length && outline.node != nullptr)) {
-    yaml.Error(*map.node(), fmt::format("{}: a sole has a length and a width, or an outline",
-                                        map.path()),
+    yaml.Error(*map.node(),
+               fmt::format("{}: a sole has a length and a width, or an outline", map.path()),
                "length is along x, width along y; outline: [[x, y], …] in the contact's frame");
     return false;
   }
@@ -249,7 +250,8 @@ bool ContactReader::ReadFriction(const Block& block, const YamlMap& map, Contact
     }
     good = false;
     if (!value) return;
-    yaml.Error(*given.node, fmt::format("{} = {} violates {} >= 0", map.PathOf(given.key), *value, key));
+    yaml.Error(*given.node,
+               fmt::format("{} = {} violates {} >= 0", map.PathOf(given.key), *value, key));
   };
   read("friction", {kPlain}, &contact->friction);
   read("torsion", {kPlain, kMm}, &contact->torsion);
@@ -273,10 +275,10 @@ std::vector<ContactFinding> PlantContacts(const std::vector<ContactPlan>& plans,
         R_WF = GroundAxes(n_W, X_WM.linear() * Vec3::UnitY());
       }
       if (!R_WF) {
-        findings.push_back({plan.place,
-                            fmt::format("contact '{}': its axis points into the ground at home",
-                                        contact.name),
-                            "axis: the direction in the foot's frame that lies along the ground"});
+        findings.push_back(
+            {plan.place,
+             fmt::format("contact '{}': its axis points into the ground at home", contact.name),
+             "axis: the direction in the foot's frame that lies along the ground"});
         continue;
       }
       Joint joint = JointOf(plan);

@@ -18,10 +18,10 @@ struct ContactPlan {
   Contact contact;
   bool holds = true;
   int foot = 0;
-  Pose X_BM = Pose::Identity();      ///< on the foot; without a place its axes are the frame's
-  std::optional<FrameRef> ground;    ///< frame F; empty: where the foot stands at home
-  std::optional<Vec3> normal_W;      ///< of the ground, unit; empty: up
-  Vec3 along_M = Vec3::UnitX();      ///< what becomes x, unit
+  Pose X_BM = Pose::Identity();    ///< on the foot; without a place its axes are the frame's
+  std::optional<FrameRef> ground;  ///< frame F; empty: where the foot stands at home
+  std::optional<Vec3> normal_W;    ///< of the ground, unit; empty: up
+  Vec3 along_M = Vec3::UnitX();    ///< what becomes x, unit
   bool along_stated = false;
   Place place = {};
 };
@@ -34,11 +34,7 @@ class ContactReader {
   ContactReader(ModelValues* values, const BodyNames& names,
                 const std::optional<std::vector<std::string>>& holding, ModelJoints* joints,
                 std::vector<ContactPlan>* plans)
-      : values_(*values),
-        names_(names),
-        holding_(holding),
-        joints_(*joints),
-        plans_(*plans) {}
+      : values_(*values), names_(names), holding_(holding), joints_(*joints), plans_(*plans) {}
 
   void Read(const Block& block);
   /// What --plant names: "BODY", "BODY:KIND@x,y,z", or "{on: BODY, …}" as in the file.
@@ -58,9 +54,9 @@ class ContactReader {
   std::vector<ContactPlan>& plans_;
 };
 
-/// Puts feet without a stated place on the ground where they are at the mechanism's home pose: their
-/// joints become loop closures that are closed there. `findings`: an error for each line that points
-/// into the ground.
+/// Puts feet without a stated place on the ground where they are at the mechanism's home pose:
+/// their joints become loop closures that are closed there. `findings`: an error for each line that
+/// points into the ground.
 struct ContactFinding {
   Place place;
   std::string message, hint;

@@ -301,10 +301,9 @@ class ModelWriter {
       if (contact.joint < 0) continue;
       const Joint& joint = m_.joints[static_cast<size_t>(contact.joint)];
       const std::string& name = names_.joints[static_cast<size_t>(contact.joint)];
-      text += fmt::format("  {}: {{on: {}, to: {}, {}}}\n", name,
-                          Ref(joint.child, joint.X_CM, name + "_foot"),
-                          Ref(joint.parent, joint.X_PF, name + "_ground"),
-                          internal::ContactText(contact));
+      text += fmt::format(
+          "  {}: {{on: {}, to: {}, {}}}\n", name, Ref(joint.child, joint.X_CM, name + "_foot"),
+          Ref(joint.parent, joint.X_PF, name + "_ground"), internal::ContactText(contact));
     }
     return text.empty() ? "" : "contacts:\n" + text;
   }

@@ -88,17 +88,15 @@ ReportSection ContactSection(const Report& report) {
   if (loads.empty()) return section;
   Table table{.name = "contacts",
               .caption = "Feet on the ground, " + loads.front()->witness,
-              .columns = {Text("foot"), Text("kind"), Digits("normal force, least"),
-                          Digits("most"), Digits("friction needed"),
-                          Digits("centre of pressure inside by"), Spare(Digits("twist")),
-                          Text("")}};
+              .columns = {Text("foot"), Text("kind"), Digits("normal force, least"), Digits("most"),
+                          Digits("friction needed"), Digits("centre of pressure inside by"),
+                          Spare(Digits("twist")), Text("")}};
   for (const ContactLoad* load : loads) {
-    const bool exceeded = std::ranges::any_of(
-        load->uses, [](const ContactLoad::Use& use) { return use.exceeded(); });
+    const bool exceeded =
+        std::ranges::any_of(load->uses, [](const ContactLoad::Use& use) { return use.exceeded(); });
     table.rows.push_back({load->name(), load->kind, UseCell(*load, Limit::kLift),
-                          fmt::format("{:.4g} N", load->most_normal),
-                          UseCell(*load, Limit::kSlip), UseCell(*load, Limit::kTip),
-                          UseCell(*load, Limit::kTwist),
+                          fmt::format("{:.4g} N", load->most_normal), UseCell(*load, Limit::kSlip),
+                          UseCell(*load, Limit::kTip), UseCell(*load, Limit::kTwist),
                           Cell(HoldText(*load), exceeded ? Mark::kWarn : Mark::kOk)});
   }
   section.Add(std::move(table));

@@ -378,8 +378,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
   // Why the base of a robot floats.
   [[nodiscard]] std::string FeetHint() const {
     const std::vector<Contact>& contacts = mechanism_->contacts;
-    const bool lifted = std::ranges::all_of(
-        contacts, [](const Contact& contact) { return contact.joint < 0; });
+    const bool lifted =
+        std::ranges::all_of(contacts, [](const Contact& contact) { return contact.joint < 0; });
     return contacts.empty() || !lifted ? "" : "; contacts: all feet are lifted, so the base floats";
   }
 

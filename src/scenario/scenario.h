@@ -147,7 +147,7 @@ struct Scenario {
   CheckLimits checks;
   SnapshotSettings snapshots;
   Expectation expect;
-  std::vector<FigureSpec> figures;  ///< that its author composes
+  std::vector<FigureSpec> figures;                  ///< that its author composes
   std::optional<std::vector<std::string>> holding;  ///< contacts that hold; empty: all
 };
 

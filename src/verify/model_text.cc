@@ -84,7 +84,8 @@ void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
 
 LoadResult LoadForeign(const std::string& file, const LoadOptions& options) {
   LoadResult result;
-  auto answer = ModelOf(file, {.held = options.base, .free = options.free_base}, &result.diagnostics);
+  auto answer =
+      ModelOf(file, {.held = options.base, .free = options.free_base}, &result.diagnostics);
   if (!answer) return result;
   LoadOptions of_text = options;
   of_text.printed = answer->printed;

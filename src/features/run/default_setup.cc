@@ -256,11 +256,10 @@ class MotionSearch {
     motion_.coordinates = commanded;
     for (const Coordinate& coordinate : commanded) {
       const auto d = static_cast<size_t>(coordinate.index);
-      motion_.strokes.push_back(
-          coordinate.kind == Coordinate::Kind::kDrive
-              ? FullStroke(d, DriveRow(m, m.drives[d], home).value,
-                           Contains(resting, m.drives[d].name))
-              : StrokeOfBase(coordinate));
+      motion_.strokes.push_back(coordinate.kind == Coordinate::Kind::kDrive
+                                    ? FullStroke(d, DriveRow(m, m.drives[d], home).value,
+                                                 Contains(resting, m.drives[d].name))
+                                    : StrokeOfBase(coordinate));
     }
   }
 
@@ -294,7 +293,9 @@ class MotionSearch {
     constexpr double kDown = -0.03, kAcross = 0.015, kTurn = 0.03;  // lengths, rad
     const int c = coordinate.component;
     return {.home = HomeValue(m_, coordinate),
-            .height = c == 2 ? kDown * length_ : c < 2 ? kAcross * length_ : kTurn,
+            .height = c == 2  ? kDown * length_
+                      : c < 2 ? kAcross * length_
+                              : kTurn,
             .start_s = 0.05 * static_cast<double>(c % 4),
             .duration_s = motion_.duration_s - 0.2};
   }
@@ -376,8 +377,8 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
       text += fmt::format("    {}: home\n", name);
     } else {
       text += fmt::format(
-          "    {}: [home, {{bump: {{start_s: {:g}, duration_s: {:g}, height: {:.6g}}}}}]\n",
-          name, stroke.start_s, stroke.duration_s, stroke.height);
+          "    {}: [home, {{bump: {{start_s: {:g}, duration_s: {:g}, height: {:.6g}}}}}]\n", name,
+          stroke.start_s, stroke.duration_s, stroke.height);
     }
   }
   if (!by_forces.empty()) {

@@ -14,10 +14,10 @@
 namespace mbv {
 
 /// Gives every DOF of a mechanism one drive. Drives that depend on others are left
-/// out unless feet on the ground make them dependent, and DOFs that none of them holds get drives on joints, chosen by rank. Idle
-/// spins need none. Rotations of balls that no drive on a joint can hold, such as spins that are
-/// not idle, move by forces: `by_forces` gets coordinates for them. What was done is reported in
-/// `notes`.
+/// out unless feet on the ground make them dependent, and DOFs that none of them holds get drives
+/// on joints, chosen by rank. Idle spins need none. Rotations of balls that no drive on a joint can
+/// hold, such as spins that are not idle, move by forces: `by_forces` gets coordinates for them.
+/// What was done is reported in `notes`.
 [[nodiscard]] Mechanism WithDriveForEachDof(const Mechanism& mechanism,
                                             std::vector<std::string>* notes,
                                             std::vector<Coordinate>* by_forces);

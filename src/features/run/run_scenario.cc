@@ -490,8 +490,7 @@ class ScenarioRun {
   void LoadContacts() {
     for (const WitnessRecord& record : report_.witnesses) {
       if (!record.summary.ok() || record.trace.time_s.empty()) continue;
-      for (ContactLoad& load :
-           ContactLoadsOf(base(), record.trace, report_.reactions_not_unique)) {
+      for (ContactLoad& load : ContactLoadsOf(base(), record.trace, report_.reactions_not_unique)) {
         load.witness = record.name;
         report_.contact_loads.push_back(std::move(load));
       }

@@ -52,7 +52,8 @@ struct MjcfImport {
   int held_inside = -1;
 
   // What the findings at the end report.
-  std::vector<std::string> held = {}, carried = {}, floating = {}, geared = {}, shifted = {}, moved = {};
+  std::vector<std::string> held = {}, carried = {}, floating = {}, geared = {}, shifted = {},
+                           moved = {};
   std::vector<std::string> driving = {};  ///< joints whose damping is negative
   std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
   std::set<int> driven_tendons = {};      ///< between two sites, with a drive

@@ -144,9 +144,9 @@ TEST_F(Feet, TheGroundBearsWhatNewtonsLawSays) {
 
 TEST_F(Feet, AMassMovedByAMillimetreMovesTheCentreOfPressureByItsShare) {
   const Slides motion;
-  const RunOutcome moved =
-      Run(Replaced(Fixture("standing_slider"), "com: [0, side, height]", "com: [0.001, side, height]"),
-          motion.Commands());
+  const RunOutcome moved = Run(
+      Replaced(Fixture("standing_slider"), "com: [0, side, height]", "com: [0.001, side, height]"),
+      motion.Commands());
   ASSERT_TRUE(moved.report) << moved.diagnostics.Text();
   const ContactLoad* load = LoadOf(moved, "reference", "sole");
   ASSERT_NE(load, nullptr);
@@ -176,10 +176,10 @@ TEST_F(Feet, EachLimitIsExceededJustBeyondWhatTheMotionNeeds) {
                         {Limit::kTip, "length", 2.0 * reach}};
   for (const Case& with : cases) {
     for (const double factor : {1.0 - 1e-6, 1.0 + 1e-6}) {
-      const RunOutcome run =
-          Run(model, motion.Commands(),
-              {{std::string("parameters.") + with.parameter, fmt::format("{}", factor * with.needed)},
-               {"simulation.mode", "inverse"}});
+      const RunOutcome run = Run(
+          model, motion.Commands(),
+          {{std::string("parameters.") + with.parameter, fmt::format("{}", factor * with.needed)},
+           {"simulation.mode", "inverse"}});
       ASSERT_TRUE(run.report) << run.diagnostics.Text();
       EXPECT_EQ(run.exit_code, 0);  // a caveat, no disagreement
       EXPECT_EQ(Exceeds(run, with.limit), factor < 1.0) << with.parameter << " " << factor;
@@ -194,8 +194,8 @@ TEST_F(Feet, ItLiftsWhereTheGroundWouldHaveToPull) {
     Slides motion{.A = 0.0};
     motion.B = factor * (1.0 + 4.0 / 20.0) * kGravity / (motion.nu * motion.nu);
     // The crest at 0.125 s is a sample only every 5 ms.
-    const RunOutcome run = Run(Fixture("standing_slider"), motion.Commands(),
-                               {{"motion.sample_s", "0.005"}});
+    const RunOutcome run =
+        Run(Fixture("standing_slider"), motion.Commands(), {{"motion.sample_s", "0.005"}});
     ASSERT_TRUE(run.report) << run.diagnostics.Text();
     EXPECT_EQ(Exceeds(run, Limit::kLift), factor > 1.0) << factor;
   }
@@ -204,9 +204,9 @@ TEST_F(Feet, ItLiftsWhereTheGroundWouldHaveToPull) {
 // Of a body at rest on a slope, the friction needed is the slope's tangent, whatever its mass.
 TEST_F(Feet, OnASlopeTheFrictionNeededIsItsTangent) {
   for (const double slope : {0.0, 0.2, 0.5}) {
-    const std::string model = Replaced(
-        Fixture("standing_slider"), "kind: sole,",
-        fmt::format("kind: sole, normal: [{}, 0, {}],", std::sin(slope), std::cos(slope)));
+    const std::string model =
+        Replaced(Fixture("standing_slider"), "kind: sole,",
+                 fmt::format("kind: sole, normal: [{}, 0, {}],", std::sin(slope), std::cos(slope)));
     const RunOutcome run = Run(model, "{x: 0, z: 0}");
     ASSERT_TRUE(run.report) << run.diagnostics.Text();
     for (const char* witness : {"reference", "simulated"}) {
@@ -296,6 +296,9 @@ TEST_F(Feet, LiftedFeetDoNotHold) {
   EXPECT_TRUE(left->Find(Limit::kTip)->exceeded());
   EXPECT_EQ(ContactCaveatsOf(run).size(), 1U);
 
+  const std::string flight = Write(Fixture("biped"), commands, "contacts: []\n");
+  EXPECT_NE(CheckFile(flight).Text().find("all feet are lifted"), std::string::npos)
+      << CheckFile(flight).Text();
   const std::string wrong = Write(Fixture("biped"), commands, "contacts: [left.sol]\n");
   EXPECT_NE(CheckFile(wrong).Text().find("biped has no contact 'left.sol'"), std::string::npos)
       << CheckFile(wrong).Text();
@@ -340,8 +343,8 @@ TEST_F(Feet, BothFeetTogetherBearTheRateOfMomentum) {
           const Mat3 I = R * body.I_Bcm_B * R.transpose();
           const Vec3 f = body.mass * (a - m.gravity_W);
           force += f;
-          moment += (sample.states.X_WB[b].translation() + r - X_WF.translation()).cross(f) + I * e +
-                    w.cross(I * w);
+          moment += (sample.states.X_WB[b].translation() + r - X_WF.translation()).cross(f) +
+                    I * e + w.cross(I * w);
         }
         const double tolerance = std::string(mode) == "inverse" ? 1e-9 : 1e-5;
         EXPECT_NEAR(all->pressure[i].x(), -moment.y() / force.z(), tolerance) << witness << i;
@@ -436,10 +439,10 @@ std::vector<double> PeakForces(const Mechanism& mechanism, const test::TestFolde
                 {.name = "along", .kind = JointDrive{m.FindJoint("along"), 0}, .range = {}}};
   }
   (void)folder.Write("model.yaml", WriteModel(m));
-  const std::string commands =
-      fmt::format("{{{}: {{sine: {{amplitude: 0.02, period_s: 0.4}}}}, {}: {{sine: {{amplitude: "
-                  "0.05, period_s: 0.8}}}}}}",
-                  m.drives[0].name, m.drives[1].name);
+  const std::string commands = fmt::format(
+      "{{{}: {{sine: {{amplitude: 0.02, period_s: 0.4}}}}, {}: {{sine: {{amplitude: "
+      "0.05, period_s: 0.8}}}}}}",
+      m.drives[0].name, m.drives[1].name);
   RunOptions options;
   options.pictures = false;
   options.out_dir = "";
