@@ -108,6 +108,12 @@ ReportSection ContactSection(const Report& report) {
         "least drive forces is shown. What all feet bear together follows from the motion.",
         On::kAll);
   }
+  if (loads.size() > 1 && !loads.back()->contact.empty()) {
+    section.Note(
+        "What all feet bear together is not judged: they do not stand on one plane, or something "
+        "else ties the robot to the ground.",
+        On::kAll);
+  }
   for (const ContactLoad* load : loads) {
     if (load->outline.size() > 2 && !load->pressure.empty()) {
       section.Add(Drawing{PressureSvg(*load)}, On::kPage);

@@ -266,6 +266,38 @@ contacts: {a: {on: top.a, kind: point, friction: 0.5}, b: {on: top.b, kind: poin
   EXPECT_NEAR(record->trace.values(0, record->trace.Find("a.reaction.fz")), a, 1e-9);
 }
 
+// Two skis: what each is pressed with follows from lever arms across them, what they share along
+// themselves does not.
+TEST_F(Feet, TwoLinesBearWhatLeverArmsSay) {
+  const std::string skis = R"(
+name: skis
+bodies:
+  top: {mass: 12, com: [0.03, 0.05, 0.6], inertia: [1, 1, 1], frames: {a: [0, 0.2, 0], b: [0, -0.2, 0]}}
+  load: {mass: 3, com: [0, 0, 0.1], inertia: [0.1, 0.1, 0.1]}
+joints:
+  float: {kind: free, parent: world, child: top}
+  slide: {kind: prismatic, parent: top, child: load, axis: y}
+drives: {y: {kind: joint, joint: slide}}
+contacts: {a: {on: top.a, kind: line, length: 0.5, friction: 0.5}, b: {on: top.b, kind: line, length: 0.5, friction: 0.5}}
+)";
+  const RunOutcome run = Run(skis, "{y: {sine: {amplitude: 0.05, period_s: 0.8}}}");
+  ASSERT_TRUE(run.report) << run.diagnostics.Text();
+  EXPECT_EQ(run.exit_code, 0) << ToTable(*run.report, {});
+  const double W = 12.0 * kGravity, w = 3.0 * kGravity;
+  for (const char* witness : {"reference", "simulated"}) {
+    const ContactLoad *a = LoadOf(run, witness, "a"), *all = LoadOf(run, witness, "");
+    ASSERT_TRUE(a != nullptr && all != nullptr);
+    EXPECT_TRUE(a->Find(Limit::kLift)->unique);
+    EXPECT_FALSE(a->Find(Limit::kTip)->unique);
+    // The load's moment about the line of b, at rest in the middle and at its crests.
+    const double omega = 2.0 * std::numbers::pi / 0.8, y = 0.05, a_y = omega * omega * y;
+    const double least = (W * 0.25 + w * (0.2 - y) - 3.0 * a_y * 0.1) / 0.4;
+    EXPECT_NEAR(a->Find(Limit::kLift)->worst, least, 1e-5) << witness;
+    EXPECT_NEAR(all->pressure[0].x(), 0.03 * W / (W + w), 1e-8) << witness;
+    EXPECT_NEAR(all->pressure[0].y() + 0.2, 0.05 * W / (W + w), 1e-8) << witness;
+  }
+}
+
 TEST_F(Feet, ALineBearsNoMomentAboutItself) {
   const Slides motion{.B = 0.0};
   const std::string model =
@@ -352,6 +384,25 @@ TEST_F(Feet, BothFeetTogetherBearTheRateOfMomentum) {
       }
     }
   }
+}
+
+TEST_F(Feet, WhatFeetShareIsMarkedAndWhatTheyBearTogetherIsNot) {
+  const RunOutcome run = Run(Fixture("biped"),
+                             "{pelvis.x: {sine: {amplitude: 0.01, period_s: 0.8}}, pelvis.y: home, "
+                             "pelvis.z: home, pelvis.roll: 0, pelvis.pitch: 0, pelvis.yaw: 0}",
+                             {{"parameters.friction", "0.001"}, {"simulation.mode", "inverse"}});
+  ASSERT_TRUE(run.report) << run.diagnostics.Text();
+  EXPECT_EQ(run.exit_code, 0);
+  size_t marked = 0, together = 0;
+  for (const std::string& caveat : ContactCaveatsOf(run)) {
+    const bool shared = caveat.find("one share of many") != std::string::npos;
+    const bool all = caveat.starts_with("all feet together slip:");
+    EXPECT_NE(shared, all) << caveat;
+    marked += shared ? 1 : 0;
+    together += all ? 1 : 0;
+  }
+  EXPECT_EQ(marked, 2U);
+  EXPECT_EQ(together, 1U);
 }
 
 TEST_F(Feet, AWrittenModelReadsBackToTheSameContacts) {
