@@ -625,18 +625,22 @@ void ReadMotors(const Block& model, YamlReader* yaml, ModelSections* s) {
   internal::ReadMotors(model, s->drives, s->joints.joints, &values, &s->motors);
 }
 
-// Of the file, then those of --plant, each with findings of its own.
+// Of the file, then those of --plant, each with findings of its own. What the ground bears is not
+// perturbed, as motors are not: no witness reads it.
 template <typename EachBlock>
 void ReadContacts(const EachBlock& each_block, const Block& model, const internal::BodyNames& names,
                   internal::ModelValues* values, Reading* reading, ModelSections* s) {
   const auto& holding = reading->options.holding;
-  internal::ContactReader contacts(values, names, holding, &s->joints, &s->contacts);
+  const std::map<std::string, double> none;
+  internal::Literals unperturbed(none);
+  internal::ModelValues judged(&reading->yaml, &unperturbed);
+  internal::ContactReader contacts(values, &judged, names, holding, &s->joints, &s->contacts);
   each_block([&](const Block& block) { contacts.Read(block); });
   for (const std::string& plant : reading->options.plants) {
     YamlReader yaml("--plant " + plant);
     internal::ModelValues own(&yaml, &reading->literals);
     const internal::BodyNames own_names(s->bodies, &own);
-    internal::ContactReader(&own, own_names, holding, &s->joints, &s->contacts)
+    internal::ContactReader(&own, &own, own_names, holding, &s->joints, &s->contacts)
         .ReadOption(model, plant);
     reading->others.Append(yaml.diagnostics());
   }

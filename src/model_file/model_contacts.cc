@@ -180,7 +180,7 @@ bool ContactReader::ReadShape(const Block& block, const YamlMap& map, Contact* c
   const auto size = [&](const char* key) {
     const YamlMap::InUnit given = map.FindInUnit(key, {kPlain, kMm});
     if (given.node == nullptr) return std::optional<double>();
-    const auto value = values_.Number(block, *given.node, map.PathOf(given.key), given.unit);
+    const auto value = judged_.Number(block, *given.node, map.PathOf(given.key), given.unit);
     if (!value || *value > 0.0) return value ? value : std::optional(kNan);
     yaml.Error(*given.node,
                fmt::format("{} = {} violates {} > 0", map.PathOf(given.key), *value, key));
@@ -225,8 +225,8 @@ bool ContactReader::ReadShape(const Block& block, const YamlMap& map, Contact* c
     const std::string of_point = fmt::format("{}[{}]", path, k);
     const auto pair = yaml.Items(*(*items)[k], of_point, 2);
     if (!pair) return false;
-    const auto x = values_.Number(block, *(*pair)[0], of_point + "[0]", outline.unit);
-    const auto y = values_.Number(block, *(*pair)[1], of_point + "[1]", outline.unit);
+    const auto x = judged_.Number(block, *(*pair)[0], of_point + "[0]", outline.unit);
+    const auto y = judged_.Number(block, *(*pair)[1], of_point + "[1]", outline.unit);
     if (!x || !y) return false;
     points.emplace_back(*x, *y);
   }
@@ -243,7 +243,7 @@ bool ContactReader::ReadFriction(const Block& block, const YamlMap& map, Contact
   const auto read = [&](const char* key, std::initializer_list<UnitSuffix> units, double* number) {
     const YamlMap::InUnit given = map.FindInUnit(key, units);
     if (given.node == nullptr) return;
-    const auto value = values_.Number(block, *given.node, map.PathOf(given.key), given.unit);
+    const auto value = judged_.Number(block, *given.node, map.PathOf(given.key), given.unit);
     if (value && *value >= 0.0) {
       *number = *value;
       return;

@@ -30,11 +30,16 @@ struct ContactPlan {
 /// once, the others by PlantContacts().
 class ContactReader {
  public:
-  /// `holding`: names of those that hold; empty: all.
-  ContactReader(ModelValues* values, const BodyNames& names,
+  /// `judged` reads what no witness computes with. `holding`: names of those that hold; empty: all.
+  ContactReader(ModelValues* values, ModelValues* judged, const BodyNames& names,
                 const std::optional<std::vector<std::string>>& holding, ModelJoints* joints,
                 std::vector<ContactPlan>* plans)
-      : values_(*values), names_(names), holding_(holding), joints_(*joints), plans_(*plans) {}
+      : values_(*values),
+        judged_(*judged),
+        names_(names),
+        holding_(holding),
+        joints_(*joints),
+        plans_(*plans) {}
 
   void Read(const Block& block);
   /// What --plant names: "BODY", "BODY:KIND@x,y,z", or "{on: BODY, …}" as in the file.
@@ -48,6 +53,7 @@ class ContactReader {
   bool ReadGround(const Block& block, const YamlMap& map, ContactPlan* plan);
 
   ModelValues& values_;
+  ModelValues& judged_;
   const BodyNames& names_;
   const std::optional<std::vector<std::string>>& holding_;
   ModelJoints& joints_;
