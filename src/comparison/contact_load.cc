@@ -65,8 +65,13 @@ struct Strength {
 
 class ContactMeter {
  public:
-  ContactMeter(const std::vector<double>& time_s, double scale_N, ContactLoad* load)
-      : time_s_(time_s), nothing_N_(kNothing * scale_N), load_(*load) {}
+  /// `scale_N`: the largest force of all feet, `length_m`: characteristic.
+  ContactMeter(const std::vector<double>& time_s, double scale_N, double length_m,
+               ContactLoad* load)
+      : time_s_(time_s),
+        nothing_N_(kNothing * scale_N),
+        nothing_Nm_(kNothing * scale_N * length_m),
+        load_(*load) {}
 
   void Measure(const Wrenches& wrenches, const Strength& strength) {
     const bool has_outline = load_.outline.size() >= 2;
@@ -82,17 +87,17 @@ class ContactMeter {
       if (!(load_.most_normal >= N)) load_.most_normal = N;
       Take(i, N, N < -nothing_N_, true, &lift);
       if (N <= nothing_N_) continue;  // nothing pushes: no pressure, no friction
-      Take(i, std::hypot(f.x(), f.y()) / N, std::hypot(f.x(), f.y()) > strength.friction * N, false,
-           &slip);
+      const double across = std::hypot(f.x(), f.y());
+      Take(i, across / N, across > strength.friction * N + nothing_N_, false, &slip);
       const Eigen::Vector2d c(-m.y() / N, m.x() / N);
       load_.pressure.push_back(c);
       if (has_outline) {
         const double inside = DistanceInside(load_.outline, c);
-        Take(i, inside, inside < 0.0, true, &tip);
+        Take(i, inside, inside * N < -nothing_Nm_, true, &tip);
       }
       if (strength.bears_moment) {
-        const double lever = std::abs(m.z() - c.x() * f.y() + c.y() * f.x()) / N;
-        Take(i, lever, lever > strength.torsion, false, &twist);
+        const double moment = std::abs(m.z() - c.x() * f.y() + c.y() * f.x());
+        Take(i, moment / N, moment > strength.torsion * N + nothing_Nm_, false, &twist);
       }
     }
     load_.mean_normal = sum / static_cast<double>(wrenches.size());
@@ -113,7 +118,7 @@ class ContactMeter {
   }
 
   const std::vector<double>& time_s_;
-  const double nothing_N_;
+  const double nothing_N_, nothing_Nm_;
   ContactLoad& load_;
 };
 
@@ -177,7 +182,7 @@ std::vector<Pose> PlacesOnOnePlane(const Mechanism& mechanism, const std::vector
 }
 
 ContactLoad Together(const std::vector<Foot>& feet, const std::vector<Pose>& places,
-                     const Trace& trace, double scale_N) {
+                     const Trace& trace, double scale_N, double length_m) {
   ContactLoad load{.witness = trace.witness};
   Wrenches sum(trace.time_s.size(), Vec6::Zero());
   Strength strength{.friction = 0.0};
@@ -203,7 +208,7 @@ ContactLoad Together(const std::vector<Foot>& feet, const std::vector<Pose>& pla
   }
   if (outlined) load.outline = ConvexHull(std::move(corners));
   if (load.outline.size() < 3) load.outline.clear();
-  ContactMeter(trace.time_s, scale_N, &load).Measure(sum, strength);
+  ContactMeter(trace.time_s, scale_N, length_m, &load).Measure(sum, strength);
   return load;
 }
 
@@ -231,6 +236,7 @@ const char* ToText(ContactLoad::Limit limit) {
 std::vector<ContactLoad> ContactLoadsOf(const Mechanism& mechanism, const Trace& trace,
                                         const std::vector<std::string>& not_unique) {
   std::vector<Foot> feet;
+  const double length_m = CharacteristicLength(mechanism);
   double scale_N = 0.0;
   for (const Contact& contact : mechanism.contacts) {
     if (contact.joint < 0) continue;
@@ -246,7 +252,7 @@ std::vector<ContactLoad> ContactLoadsOf(const Mechanism& mechanism, const Trace&
                      .kind = WordOf(foot.contact->kind),
                      .witness = trace.witness,
                      .outline = foot.contact->outline};
-    ContactMeter(trace.time_s, scale_N, &load)
+    ContactMeter(trace.time_s, scale_N, length_m, &load)
         .Measure(foot.wrenches, {.friction = foot.contact->friction,
                                  .torsion = foot.contact->torsion,
                                  .bears_moment = foot.contact->kind != Contact::Kind::kPoint});
@@ -255,7 +261,7 @@ std::vector<ContactLoad> ContactLoadsOf(const Mechanism& mechanism, const Trace&
   }
   if (feet.size() < 2 || !BearAll(mechanism, feet)) return loads;
   const std::vector<Pose> places = PlacesOnOnePlane(mechanism, feet);
-  if (!places.empty()) loads.push_back(Together(feet, places, trace, scale_N));
+  if (!places.empty()) loads.push_back(Together(feet, places, trace, scale_N, length_m));
   return loads;
 }
 
