@@ -102,13 +102,15 @@ ReportSection ContactSection(const Report& report) {
   section.Add(std::move(table));
   const bool shared =
       std::ranges::any_of(loads, [](const ContactLoad* load) { return !load->unique(); });
+  const bool together = loads.back()->contact.empty();
   if (shared) {
     section.Note(
-        "Statics leaves open what the feet share of the forces: of all shares the one with the "
-        "least drive forces is shown. What all feet bear together follows from the motion.",
+        fmt::format("Statics leaves open what the feet share of the forces: of all shares "
+                    "the one with the least drive forces is shown.{}",
+                    together ? " What all feet bear together follows from the motion." : ""),
         On::kAll);
   }
-  if (loads.size() > 1 && !loads.back()->contact.empty()) {
+  if (loads.size() > 1 && !together) {
     section.Note(
         "What all feet bear together is not judged: they do not stand on one plane, or something "
         "else ties the robot to the ground.",
