@@ -128,8 +128,9 @@ struct MotionTable {
   double stamp_error_s = 0.0;       ///< rounding of the printed times
   bool periodic = false, with_rates = false;
   bool moves = false;              ///< a command: its second derivative makes forces
-  std::string smoothing = "none";  ///< "none", "auto" or "stated"
+  std::string smoothing = "none";  ///< "none", "auto", "stated" or "cut-off"
   double deviation = 0.0;          ///< standard deviation of the noise: estimated, or as stated
+  double cutoff_hz = kNan;         ///< smoothing halves this frequency; NaN: it changes nothing
   /// The smoothing spline less the interpolating one over all rows: that in use, or, without
   /// smoothing, what `auto` would do. Value and second derivative, and that of the spline in use.
   double change_rms = 0.0, change_max = 0.0;

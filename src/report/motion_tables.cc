@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "report/page.h"
 
 namespace mbv {
@@ -14,7 +16,10 @@ constexpr double kReportedShare = 1e-4;
 
 std::string SmoothingText(const MotionTable& table) {
   if (!table.smoothed()) return "none";
-  return fmt::format("{}, deviation {:.2g} {}", table.smoothing, table.deviation, table.unit);
+  return fmt::format("{}, deviation {:.2g} {}{}", table.smoothing, table.deviation, table.unit,
+                     std::isfinite(table.cutoff_hz)
+                         ? fmt::format(", halves {:.3g} Hz", table.cutoff_hz)
+                         : "");
 }
 
 std::string KindText(const MotionTable& table) {
@@ -105,6 +110,7 @@ Json MotionTableJson(const Report& report) {
                       {"with_rates", table.with_rates},
                       {"smoothing", table.smoothing},
                       {"deviation", Number(table.deviation)},
+                      {"cutoff_hz", Number(table.cutoff_hz)},
                       {"change_rms", Number(table.change_rms)},
                       {"change_max", Number(table.change_max)},
                       {"acceleration_change_rms", Number(table.acceleration_change_rms)},

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/diagnostics.h"
@@ -32,6 +33,9 @@ struct RunOptions {
   /// The user's MJCF that the scenario was made of: it is run as it is, in addition; "": none.
   std::string source_model;
   std::string source_base;  ///< LoadOptions::base with which it was made
+  /// Files of a product that stand in the result's folder, too: names and contents made of what the
+  /// run of a motion gave; null: none.
+  std::function<std::vector<std::pair<std::string, std::string>>(const Report&)> more_files;
   ProgressFunction progress;
 };
 

@@ -156,6 +156,31 @@ TEST_F(MotionTableTest, NoiseIsReportedAndTakenOut) {
   EXPECT_NEAR(stated.scenario->motion.tables[0].change_rms, 2e-4, 2e-5);
 }
 
+// Sines of half, once and twice the cut-off: 64/65, 1/2 and 1/65 of them pass.
+TEST_F(MotionTableTest, AStatedCutOffIsTheFilterThatIsDocumented) {
+  constexpr double kCutoffHz = 5.0;
+  for (const double factor : {0.5, 1.0, 2.0}) {
+    WriteTable("sine.csv", 801, 0.005, [&](double t) {
+      return Jet{1.5 + 0.1 * std::sin(2 * pi * factor * kCutoffHz * t), 0.0, 0.0};
+    });
+    const ScenarioResult result = Load(
+        "{table: {csv: sine.csv, column: angle, smoothing: {cutoff_hz: 5}}}", "sample_s: 0.01");
+    ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+    const MotionTable& table = result.scenario->motion.tables[0];
+    EXPECT_EQ(table.cutoff_hz, kCutoffHz);
+    double amplitude = 0.0;
+    for (double t = 1.5; t < 2.5; t += 1e-3) {
+      amplitude = std::max(amplitude, std::abs(Evaluate(*table.spline, t).value - 1.5));
+    }
+    EXPECT_NEAR(amplitude, 0.1 / (1.0 + std::pow(factor, 6)), 2e-4) << factor;
+  }
+  WriteTable("sine.csv", 801, 0.005, Swing);
+  EXPECT_NE(Messages("{table: {csv: sine.csv, column: angle, smoothing: {cutoff_hz: 100}}}",
+                     "sample_s: 0.01")
+                .find("smoothing.cutoff_hz = 100 violates < 100, half of the frequency of the rows"),
+            std::string::npos);
+}
+
 TEST_F(MotionTableTest, ExactTablesAreNotDoubted) {
   WriteTable("a.csv", 41, 0.025, Swing);
   EXPECT_EQ(Messages("{table: {csv: a.csv, column: angle, rate: speed}}"), "");

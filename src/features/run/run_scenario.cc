@@ -565,6 +565,9 @@ class ScenarioRun {
     }
     write("inputs.json", ToJson(inputs_.files()));
     write("summary.json", ToJson(report_));
+    if (options_.more_files) {
+      for (const auto& [name, content] : options_.more_files(report_)) write(name, content);
+    }
     if (options_.page) {
       write("report.html",
             RunPage(report_, prepared_->mechanisms.simulated, simulation, pictures_,

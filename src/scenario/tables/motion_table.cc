@@ -92,7 +92,14 @@ class Loader {
   [[nodiscard]] std::string RateName() const { return use_.name + " rate"; }
 
   void ReadSmoothing(const YamlNode& node, const std::string& path) {
-    if (node.is_scalar() && (node.text == "none" || node.text == "auto")) {
+    if (node.is_map()) {
+      const YamlMap map(&yaml(), &node, path, {"cutoff_hz"});
+      const auto cutoff_hz = values_.RequiredPositive(map, "cutoff_hz");
+      if (!cutoff_hz) return;
+      table_.smoothing = "cut-off";
+      rows_.cutoff_hz = *cutoff_hz;
+      cutoff_place_ = &node;
+    } else if (node.is_scalar() && (node.text == "none" || node.text == "auto")) {
       table_.smoothing = node.text;
     } else if (const auto deviation = values_.Positive(node, path)) {
       table_.smoothing = "stated";
@@ -108,6 +115,7 @@ class Loader {
       return false;
     }
     rows_.time_s = TrueTimes(*source_);
+    if (!CheckCutoff()) return false;
     for (size_t c = 0; c < source_->columns.size(); ++c) {
       const bool rate = source_->columns[c].channel.name == RateName();
       const VecX column = source_->values.col(static_cast<Eigen::Index>(c));
@@ -115,6 +123,19 @@ class Loader {
       (rate ? rows_.rate_deviation : rows_.deviation) = DeviationOf(c);
     }
     return true;
+  }
+
+  // Rows show no frequency above half of theirs.
+  bool CheckCutoff() {
+    const double whole_s = rows_.time_s.back() - rows_.time_s.front();
+    const double highest_hz = 0.5 * static_cast<double>(rows_.time_s.size() - 1) / whole_s;
+    if (rows_.cutoff_hz < highest_hz) return true;
+    yaml().Error(*cutoff_place_,
+                 fmt::format("{}.smoothing.cutoff_hz = {:g} violates < {:g}, half of the frequency "
+                             "of the rows of {}",
+                             path_, rows_.cutoff_hz, highest_hz, settings_.csv),
+                 "smoothing: none takes the rows as they are");
+    return false;
   }
 
   // What no smooth curve explains, but not less than what rounding to the printed digits makes.
@@ -165,6 +186,7 @@ class Loader {
   const MotionTableUse& use_;
   TableSettings settings_;
   double stated_ = 0.0;  // deviation, in the column's own numbers
+  const YamlNode* cutoff_place_ = nullptr;
   std::shared_ptr<const ReferenceTable> source_;
   SplineRows rows_;
   MotionTable table_;

@@ -17,7 +17,8 @@ constexpr int kLooks = 4;      // in each interval
 // Three rounds of a periodic table, the middle one at its own times.
 SplineRows Repeated(const SplineRows& rows, double advance) {
   SplineRows all{
-      .deviation = rows.deviation, .rate_deviation = rows.rate_deviation, .stated = rows.stated};
+      .deviation = rows.deviation, .rate_deviation = rows.rate_deviation, .stated = rows.stated,
+      .cutoff_hz = rows.cutoff_hz};
   const size_t last = rows.time_s.size() - 1;
   const double period_s = rows.time_s[last] - rows.time_s[0];
   const auto add = [&](size_t i, double time_s, double more) {
@@ -65,9 +66,14 @@ class RowFit {
 
   [[nodiscard]] Piecewise Through() const { return FitSpline(knots_, data_); }
 
-  [[nodiscard]] Piecewise Near() const {
+  [[nodiscard]] Piecewise Near(double* cutoff_hz) const {
+    *cutoff_hz = rows_.cutoff_hz;
+    if (rows_.cutoff_hz > 0.0) return FitSpline(knots_, data_, LambdaOf(rows_.cutoff_hz));
+    *cutoff_hz = std::numeric_limits<double>::infinity();
     if (exact_) return Through();
-    return FitSpline(knots_, data_, std::exp(rows_.stated ? Allowed() : CrossValidated()));
+    const double lambda = std::exp(rows_.stated ? Allowed() : CrossValidated());
+    *cutoff_hz = CutoffOf(lambda);
+    return FitSpline(knots_, data_, lambda);
   }
 
  private:
@@ -80,6 +86,27 @@ class RowFit {
   struct Span {
     double low, high;
   };
+
+  // λ whose cut-off (3) this is.
+  [[nodiscard]] double LambdaOf(double cutoff_hz) const {
+    const double w = 2.0 * std::numbers::pi * cutoff_hz;
+    const double rate_weight = rows_.rates.empty() ? 0.0 : data_[1].weight;
+    const double whole_s = rows_.time_s.back() - rows_.time_s.front();
+    const double step_s = whole_s / static_cast<double>(rows_.time_s.size() - 1);
+    const double weight2 =
+        data_[0].weight * data_[0].weight + rate_weight * rate_weight * w * w;
+    return weight2 / (step_s * std::pow(w, 6));
+  }
+
+  // The inverse: λ falls with the cut-off.
+  [[nodiscard]] double CutoffOf(double lambda) const {
+    double low = -40.0, high = 40.0;  // of the logarithm of the frequency
+    while (high - low > 1e-9) {
+      const double middle = 0.5 * (low + high);
+      (LambdaOf(std::exp(middle)) > lambda ? low : high) = middle;
+    }
+    return std::exp(low);
+  }
 
   // Logarithms of λ between what bends freely within the shortest step and what is a parabola over
   // all rows.
@@ -157,12 +184,14 @@ class RowFit {
   bool exact_ = false;
 };
 
-Piecewise FitRows(const SplineRows& rows, const Rounds& rounds, bool smooth) {
-  if (!rounds.periodic) return smooth ? RowFit(rows).Near() : RowFit(rows).Through();
+// Through all rows without `cutoff_hz`.
+Piecewise FitRows(const SplineRows& rows, const Rounds& rounds, double* cutoff_hz) {
+  const bool smooth = cutoff_hz != nullptr;
+  if (!rounds.periodic) return smooth ? RowFit(rows).Near(cutoff_hz) : RowFit(rows).Through();
   const SplineRows all = Repeated(rows, rounds.advance);
   const RowFit fit(all);
-  return Round(smooth ? fit.Near() : fit.Through(), rows.time_s.front(), rows.time_s.back(),
-               rounds.advance);
+  return Round(smooth ? fit.Near(cutoff_hz) : fit.Through(), rows.time_s.front(),
+               rows.time_s.back(), rounds.advance);
 }
 
 template <typename Look>
@@ -187,11 +216,12 @@ JetSize Sizes(const std::vector<double>& time_s, const Look& look) {
 }  // namespace
 
 Piecewise Interpolated(const SplineRows& rows, const Rounds& rounds) {
-  return FitRows(rows, rounds, false);
+  return FitRows(rows, rounds, nullptr);
 }
 
-Piecewise Smoothed(const SplineRows& rows, const Rounds& rounds) {
-  return FitRows(rows, rounds, true);
+Piecewise Smoothed(const SplineRows& rows, const Rounds& rounds, double* cutoff_hz) {
+  double unwanted = 0.0;
+  return FitRows(rows, rounds, cutoff_hz == nullptr ? &unwanted : cutoff_hz);
 }
 
 JetSize DifferenceOf(const Piecewise& a, const Piecewise& b, const std::vector<double>& time_s) {
@@ -263,9 +293,12 @@ class SplineMaker {
   }
 
   void Fit() {
-    const Piecewise through = Interpolated(rows_, rounds_), smooth = Smoothed(rows_, rounds_);
+    double cutoff_hz = kNan;
+    const Piecewise through = Interpolated(rows_, rounds_);
+    const Piecewise smooth = Smoothed(rows_, rounds_, &cutoff_hz);
     const JetSize change = DifferenceOf(smooth, through, rows_.time_s);
     const Piecewise& used = table_.smoothed() ? smooth : through;
+    if (table_.smoothed() && std::isfinite(cutoff_hz)) table_.cutoff_hz = cutoff_hz;
     table_.change_rms = change.rms.value;
     table_.change_max = change.max.value;
     table_.acceleration_change_rms = change.rms.acceleration;

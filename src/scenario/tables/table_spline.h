@@ -17,6 +17,11 @@
 // cross-validation [Craven 1979], which needs no σ but the ratio of σ to σ_v: the least of
 //   n misfit / (n − p)²,                                                                    (2)
 // p the effective number of parameters; misfit/(n − p) then estimates how far σ is off.
+//
+// Rows a time h apart make of (1) a filter without delay: it passes a sine of frequency ω by
+//   H(ω) = W/(W + λ h ω⁶),  W = 1/σ² + ω²/σ_v²                                              (3)
+// (away from the ends; the second part of W where rates are given). Its cut-off halves the
+// amplitude, W = λ h ω⁶, and where a cut-off is stated, this gives λ.
 
 namespace mbv {
 
@@ -27,6 +32,7 @@ struct SplineRows {
   double deviation = 0.0;                       ///< σ; 0: exact
   double rate_deviation = 0.0;                  ///< σ_v
   bool stated = false;                          ///< σ is known; else it is near enough for (2)
+  double cutoff_hz = 0.0;                       ///< stated cut-off of (3); 0: λ by σ or by (2)
 };
 
 /// How often rows occur in time.
@@ -38,8 +44,10 @@ struct Rounds {
 /// The spline that meets every row: four continuous derivatives, three where rates are given. It
 /// goes on beyond the rows as its last polynomials do, or repeats.
 [[nodiscard]] Piecewise Interpolated(const SplineRows& rows, const Rounds& rounds = {});
-/// The smoothing spline (1); Interpolated() where σ is zero.
-[[nodiscard]] Piecewise Smoothed(const SplineRows& rows, const Rounds& rounds = {});
+/// The smoothing spline (1); Interpolated() where σ is zero and no cut-off is stated. `cutoff_hz`:
+/// that of (3), infinite where nothing is smoothed.
+[[nodiscard]] Piecewise Smoothed(const SplineRows& rows, const Rounds& rounds = {},
+                                 double* cutoff_hz = nullptr);
 
 /// RMS and largest magnitude, of the values and their derivatives.
 struct JetSize {
