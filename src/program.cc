@@ -15,7 +15,7 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddConvergeCommand,
     AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
     AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
-    AddMergeCommand, AddHistoryCommand;
+    AddMergeCommand, AddHistoryCommand, AddLogCommand;
 
 namespace {
 
@@ -44,6 +44,7 @@ constexpr std::array kCommands = {
     CommandRow{AddSurveyCommand, kRobots, true},
     CommandRow{AddInertiaCommand, kRobots, true},
     CommandRow{AddSizeCommand, kRobots},
+    CommandRow{AddLogCommand, kRobots, true},
     CommandRow{AddCrosscheckCommand, kEngines},
     CommandRow{AddRenderCommand, kPublish, true},
     CommandRow{AddFiguresCommand, kPublish},

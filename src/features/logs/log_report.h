@@ -1,0 +1,62 @@
+// A robot's log against the model: what was measured of each drive beside what the model needs.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "features/logs/log_fit.h"
+#include "features/logs/log_rows.h"
+#include "report/report.h"
+
+namespace mbv {
+
+/// One drive.
+struct LogDrive {
+  std::string name, unit, heading;
+  LogFit fit = {};
+  std::vector<double> time_s = {}, log = {}, model = {}, velocity = {};  ///< at the log's rows
+};
+
+/// A rate or acceleration of the log against that of the motion.
+struct LogRate {
+  std::string signal, unit;
+  double rms = kNan;             ///< of the log's
+  double rms_difference = kNan;  ///< of both
+  bool shapes = false;           ///< it is one of the data that the motion's spline follows
+};
+
+struct LogComparison {
+  std::string file, name;
+  size_t rows = 0;
+  double begin_s = 0.0, duration_s = 0.0, step_s = kNan;
+  bool even = false;
+  std::string witness;  ///< whose forces "model" is; "" where none ran
+  std::vector<LogDrive> drives;
+  std::vector<LogRate> rates;
+  std::vector<MotionTable> tables;  ///< how positions were smoothed
+  std::vector<SmoothedForce> smoothed_forces;
+  /// Signal, heading, unit of the numbers: every column that is used.
+  std::vector<std::array<std::string, 3>> columns;
+  std::vector<std::string> notes;
+};
+
+/// `names`: what the run's model calls the axes.
+[[nodiscard]] LogComparison CompareLog(const RobotLog& log, const std::vector<LogAxis>& axes,
+                                       const std::vector<std::string>& names,
+                                       const std::vector<bool>& shaping, const Report& report,
+                                       double most_delay_s);
+
+/// The largest share of a drive; 0 without one.
+[[nodiscard]] double LargestShare(const LogComparison& comparison);
+
+/// For a terminal.
+[[nodiscard]] std::string ToText(const LogComparison& comparison, const TextStyle& style);
+/// log.json: schema mbverify.log_comparison/1.
+[[nodiscard]] nlohmann::ordered_json ToJson(const LogComparison& comparison);
+/// log.html, log.csv and log.json.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> LogFiles(
+    const LogComparison& comparison, const Report& report);
+
+}  // namespace mbv
