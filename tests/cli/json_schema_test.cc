@@ -50,6 +50,8 @@ constexpr Call kCalls[] = {
     {"list", 0},
     {"inertia OUT/box.urdf", 1},
     {"survey OUT", 0},
+    {"log four_bar OUT/x/four_bar/turn_inverse/traces.csv --no-pictures --out OUT/x", 0},
+    {"log four_bar OUT/box.obj --no-pictures --out OUT/x", 2},
     {"size slider_crank/buffer", 0},
     {"size four_bar/turn", 2},
     {"figures four_bar/turn --only drive_torques --out OUT/figures", 0},

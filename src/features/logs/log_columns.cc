@@ -31,39 +31,67 @@ struct WordMeaning {
 const std::map<std::string, LogQuantity, std::less<>>& QuantityWords() {
   using enum LogQuantity;
   static const std::map<std::string, LogQuantity, std::less<>> words = {
-      {"pos", kPosition},       {"position", kPosition},    {"positions", kPosition},
-      {"q", kPosition},         {"qpos", kPosition},        {"angle", kPosition},
-      {"ang", kPosition},       {"theta", kPosition},       {"enc", kPosition},
-      {"encoder", kPosition},   {"stroke", kPosition},      {"vel", kVelocity},
-      {"velocity", kVelocity},  {"velocities", kVelocity},  {"qd", kVelocity},
-      {"dq", kVelocity},        {"qdot", kVelocity},        {"qvel", kVelocity},
-      {"speed", kVelocity},     {"rate", kVelocity},        {"omega", kVelocity},
-      {"acc", kAcceleration},   {"accel", kAcceleration},   {"acceleration", kAcceleration},
-      {"qdd", kAcceleration},   {"ddq", kAcceleration},     {"qddot", kAcceleration},
-      {"qacc", kAcceleration},  {"accelerations", kAcceleration},
-      {"eff", kEffort},         {"effort", kEffort},        {"efforts", kEffort},
-      {"tau", kEffort},         {"torque", kEffort},        {"torques", kEffort},
-      {"trq", kEffort},         {"force", kEffort},         {"moment", kEffort}};
+      {"pos", kPosition},
+      {"position", kPosition},
+      {"positions", kPosition},
+      {"q", kPosition},
+      {"qpos", kPosition},
+      {"angle", kPosition},
+      {"ang", kPosition},
+      {"theta", kPosition},
+      {"enc", kPosition},
+      {"encoder", kPosition},
+      {"stroke", kPosition},
+      {"vel", kVelocity},
+      {"velocity", kVelocity},
+      {"velocities", kVelocity},
+      {"qd", kVelocity},
+      {"dq", kVelocity},
+      {"qdot", kVelocity},
+      {"qvel", kVelocity},
+      {"speed", kVelocity},
+      {"rate", kVelocity},
+      {"omega", kVelocity},
+      {"acc", kAcceleration},
+      {"accel", kAcceleration},
+      {"acceleration", kAcceleration},
+      {"qdd", kAcceleration},
+      {"ddq", kAcceleration},
+      {"qddot", kAcceleration},
+      {"qacc", kAcceleration},
+      {"accelerations", kAcceleration},
+      {"eff", kEffort},
+      {"effort", kEffort},
+      {"efforts", kEffort},
+      {"tau", kEffort},
+      {"torque", kEffort},
+      {"torques", kEffort},
+      {"trq", kEffort},
+      {"force", kEffort},
+      {"moment", kEffort}};
   return words;
 }
 
 WordMeaning MeaningOf(const std::string& word) {
   static const std::set<std::string, std::less<>> filler = {
-      "joint", "joints", "jointstates", "jointstate", "state", "states", "js", "field", "msg",
-      "data", "measured", "meas", "actual", "act", "est", "estimated", "feedback", "fb", "motor",
-      "drive", "actuator", "robot", "sensor", "value", "jnt", "of", "in"};
+      "joint", "joints",    "jointstates", "jointstate", "state", "states", "js",
+      "field", "msg",       "data",        "measured",   "meas",  "actual", "act",
+      "est",   "estimated", "feedback",    "fb",         "motor", "drive",  "actuator",
+      "robot", "sensor",    "value",       "jnt",        "of",    "in"};
   static const std::set<std::string, std::less<>> commanded = {
-      "cmd", "command", "commanded", "des", "desired", "ref", "reference", "target", "setpoint",
-      "goal", "ff", "feedforward"};
+      "cmd",       "command", "commanded", "des",  "desired", "ref",
+      "reference", "target",  "setpoint",  "goal", "ff",      "feedforward"};
   static const std::set<std::string, std::less<>> other = {
-      "temp", "temperature", "current", "voltage", "error", "err", "status", "limit", "max", "min",
-      "kp", "kd", "ki", "gain", "std", "var", "cov", "pwm", "mode", "fault", "flag", "seq", "imu",
-      "gps", "header", "frame", "id", "battery", "name", "names", "analytic", "simulated",
-      "reaction", "fx", "fy", "fz", "mx", "my", "mz", "power", "energy", "work", "gap", "twist",
-      "lower", "upper"};
+      "temp",     "temperature", "current", "voltage", "error", "err",   "status",   "limit",
+      "max",      "min",         "kp",      "kd",      "ki",    "gain",  "std",      "var",
+      "cov",      "pwm",         "mode",    "fault",   "flag",  "seq",   "imu",      "gps",
+      "header",   "frame",       "id",      "battery", "name",  "names", "analytic", "simulated",
+      "reaction", "fx",          "fy",      "fz",      "mx",    "my",    "mz",       "power",
+      "energy",   "work",        "gap",     "twist",   "lower", "upper"};
   static const std::set<std::string, std::less<>> units = {
-      "rad", "rads", "radians", "deg", "degs", "degrees", "mm", "m", "s", "nm", "n", "mnm", "rpm",
-      "mrad", "ms", "us", "ns", "sec", "secs", "nsec", "nsecs", "nanosec", "kn"};
+      "rad", "rads", "radians", "deg",  "degs",  "degrees", "mm", "m",
+      "s",   "nm",   "n",       "mnm",  "rpm",   "mrad",    "ms", "us",
+      "ns",  "sec",  "secs",    "nsec", "nsecs", "nanosec", "kn"};
   static const std::set<std::string, std::less<>> time = {"time", "t", "timestamp", "stamp",
                                                           "timestamps"};
   if (const auto found = QuantityWords().find(word); found != QuantityWords().end()) {
@@ -78,7 +106,8 @@ WordMeaning MeaningOf(const std::string& word) {
 }
 
 bool IsNumber(const std::string& word) {
-  return !word.empty() && std::ranges::all_of(word, [](unsigned char c) { return std::isdigit(c); });
+  return !word.empty() &&
+         std::ranges::all_of(word, [](unsigned char c) { return std::isdigit(c); });
 }
 
 // In lower case, cut at signs and before capitals: "leftKnee_pos[rad]" → left, knee, pos, rad.
@@ -127,12 +156,12 @@ struct NameMatch {
 // A heading as far as its words explain it.
 struct HeadingSense {
   enum class Kind {
-    kSignal,     // of an axis
-    kIndexed,    // position[3]
-    kName,       // name[3], or all names
-    kCommanded,  // a command, not what was measured
-    kNoQuantity, // names a joint, but the words behind are unknown
-    kAmbiguous,  // several joints
+    kSignal,      // of an axis
+    kIndexed,     // position[3]
+    kName,        // name[3], or all names
+    kCommanded,   // a command, not what was measured
+    kNoQuantity,  // names a joint, but the words behind are unknown
+    kAmbiguous,   // several joints
     kElse
   };
   Kind kind = Kind::kElse;
@@ -146,8 +175,8 @@ struct HeadingSense {
 
 std::string UnitOfWords(const Words& words) {
   static const std::map<std::string, std::string, std::less<>> plain = {
-      {"rads", "rad/s"}, {"degs", "deg/s"}, {"radians", "rad"}, {"degrees", "deg"}, {"nm", "N*m"},
-      {"n", "N"},        {"mnm", "mN*m"},   {"kn", "kN"}};
+      {"rads", "rad/s"}, {"degs", "deg/s"}, {"radians", "rad"}, {"degrees", "deg"},
+      {"nm", "N*m"},     {"n", "N"},        {"mnm", "mN*m"},    {"kn", "kN"}};
   std::string unit;
   for (const std::string& word : words) {
     const auto found = plain.find(word);
@@ -334,8 +363,7 @@ class Mapper {
     if (auto found = FindHeading(stated.column)) return found;
     ErrorAt(request.place,
             fmt::format("{}: {} has no column '{}'", stated.path, file_, stated.column),
-            DidYouMean(stated.column, Headings(),
-                       "it has " + Joined(Headings(), kNamedAtMost)));
+            DidYouMean(stated.column, Headings(), "it has " + Joined(Headings(), kNamedAtMost)));
     return {};
   }
 
@@ -381,7 +409,8 @@ class Mapper {
   }
   [[nodiscard]] Words AxisNames() const {
     Words names;
-    for (const LogAxis& axis : axes_) names.insert(names.end(), axis.names.begin(), axis.names.end());
+    for (const LogAxis& axis : axes_)
+      names.insert(names.end(), axis.names.begin(), axis.names.end());
     return names;
   }
 
@@ -402,8 +431,7 @@ class Mapper {
   bool SetUnit(size_t index, const std::string& by_words, const Finding* place, LogColumn* column) {
     const TableHeading& heading = text_.headings[index];
     column->index = index;
-    column->heading =
-        heading.full.empty() ? fmt::format("column {}", index + 1) : heading.full;
+    column->heading = heading.full.empty() ? fmt::format("column {}", index + 1) : heading.full;
     column->line = heading.line;
     column->character = heading.character;
     const std::string si = axes_[column->axis].UnitOf(column->quantity);
@@ -436,8 +464,7 @@ class Mapper {
   }
 
   [[nodiscard]] std::string SignalOf(const LogColumn& column) const {
-    return axes_[column.axis].name() + "." +
-           kLogQuantities[static_cast<size_t>(column.quantity)];
+    return axes_[column.axis].name() + "." + kLogQuantities[static_cast<size_t>(column.quantity)];
   }
 
   // Seconds of one unit of the clock.
@@ -472,7 +499,8 @@ class Mapper {
     const std::string cell = CellOf(0, clock->index);
     const double value = std::abs(ReadCell(cell, text_.decimal_comma).value);
     for (const auto& [least, unit_s, name] :
-         {std::tuple{1e17, 1e-9, "ns"}, std::tuple{1e14, 1e-6, "us"}, std::tuple{1e11, 1e-3, "ms"}}) {
+         {std::tuple{1e17, 1e-9, "ns"}, std::tuple{1e14, 1e-6, "us"},
+          std::tuple{1e11, 1e-3, "ms"}}) {
       if (value < least) continue;
       clock->unit_s = unit_s;
       mapping_.notes.push_back(
@@ -538,13 +566,12 @@ class Mapper {
     }
     taken_[clock.index] = true;
     clock.heading = text_.headings[clock.index].full;
-    if (!clock.nanoseconds &&
-        !ReadClockUnit(&clock, WordsOf(text_.headings[clock.index].name))) {
+    if (!clock.nanoseconds && !ReadClockUnit(&clock, WordsOf(text_.headings[clock.index].name))) {
       return;
     }
     if ((stamp || clock.nanoseconds) && plain) {
-      mapping_.notes.push_back(fmt::format("the time is '{}', not '{}'", clock.heading,
-                                           text_.headings[*plain].full));
+      mapping_.notes.push_back(
+          fmt::format("the time is '{}', not '{}'", clock.heading, text_.headings[*plain].full));
     }
     mapping_.clock = clock;
   }
@@ -562,8 +589,7 @@ class Mapper {
                               (match.words == best[0].words && match.letters < best[0].letters))) {
           continue;
         }
-        if (!best.empty() &&
-            (match.words > best[0].words || match.letters > best[0].letters)) {
+        if (!best.empty() && (match.words > best[0].words || match.letters > best[0].letters)) {
           best.clear();
         }
         const bool known = std::ranges::any_of(
@@ -631,7 +657,8 @@ class Mapper {
     }
     int first = std::numeric_limits<int>::max();
     for (size_t i = 0; i < text_.columns; ++i) {
-      if (!taken_[i] && senses_[i].kind == Kind::kIndexed) first = std::min(first, senses_[i].number);
+      if (!taken_[i] && senses_[i].kind == Kind::kIndexed)
+        first = std::min(first, senses_[i].number);
     }
     if (!settings_.joints.empty()) {
       names.clear();
@@ -653,9 +680,8 @@ class Mapper {
         array_[k] = matches[0].axis;
       } else {
         elsewhere_.insert(k);
-        mapping_.notes.push_back(
-            fmt::format("the model has no joint '{}': column {} of the arrays is not used", name,
-                        k));
+        mapping_.notes.push_back(fmt::format(
+            "the model has no joint '{}': column {} of the arrays is not used", name, k));
       }
     }
   }
@@ -696,9 +722,8 @@ class Mapper {
         Error(heading.line, heading.character,
               fmt::format("'{}' may belong to {}", heading.full, Joined(sense.candidates)),
               fmt::format("--column {}.{}='{}' says which one is meant, --ignore '{}' none",
-                          sense.candidates[0],
-                          kLogQuantities[static_cast<size_t>(sense.quantity)], heading.full,
-                          heading.full));
+                          sense.candidates[0], kLogQuantities[static_cast<size_t>(sense.quantity)],
+                          heading.full, heading.full));
         return;
       case Kind::kCommanded:
       case Kind::kName:
@@ -822,8 +847,7 @@ std::vector<LogAxis> LogAxes(const Mechanism& mechanism) {
         break;
       case Coordinate::Kind::kJoint:
       case Coordinate::Kind::kOutput:
-        axis.range =
-            mechanism.joints[index].range[static_cast<size_t>(named.coordinate.component)];
+        axis.range = mechanism.joints[index].range[static_cast<size_t>(named.coordinate.component)];
         break;
     }
     axes.push_back(std::move(axis));

@@ -42,7 +42,7 @@ struct LogRobot {
   Mechanism mechanism;
   std::vector<std::pair<fs::path, std::string>> files;  // of a model that is made
   std::string model_ref;
-  bool made = false;          // from a robot's file
+  bool made = false;               // from a robot's file
   std::vector<std::string> names;  // of the axes, in the scenario
 };
 
@@ -79,8 +79,8 @@ class LogRun {
     return WriteJson(2, Verdict::kNotRun, "bad input", "", nullptr);
   }
 
-  int WriteJson(int exit_code, Verdict verdict, const std::string& reason, const std::string& folder,
-                const nlohmann::ordered_json& log) {
+  int WriteJson(int exit_code, Verdict verdict, const std::string& reason,
+                const std::string& folder, const nlohmann::ordered_json& log) {
     return WorseExit(exit_code, arguments_.json.Write({{"exit_code", exit_code},
                                                        {"verdict", ToText(verdict)},
                                                        {"reason", reason},
@@ -117,11 +117,12 @@ class LogRun {
       findings_.Append(made.diagnostics);
       if (!made.setup) return false;
       if (made.setup->by_forces > 0) {
-        AddError(arguments_.robot,
-                 fmt::format("{} degrees of freedom move by forces, and a log does not say how they "
-                             "start",
-                             made.setup->by_forces),
-                 "a model file (mbverify init NAME --from ROBOT) can hold them");
+        AddError(
+            arguments_.robot,
+            fmt::format("{} degrees of freedom move by forces, and a log does not say how they "
+                        "start",
+                        made.setup->by_forces),
+            "a model file (mbverify init NAME --from ROBOT) can hold them");
         return false;
       }
       robot_.made = true;
@@ -177,7 +178,8 @@ class LogRun {
           axes_, [&](const LogAxis& one) { return Contains(one.names, name); });
       if (axis == axes_.end()) {
         std::vector<std::string> names;
-        for (const LogAxis& one : axes_) names.insert(names.end(), one.names.begin(), one.names.end());
+        for (const LogAxis& one : axes_)
+          names.insert(names.end(), one.names.begin(), one.names.end());
         AddError("--hold " + name, "the model has no drive or joint of this name",
                  DidYouMean(name, names));
         continue;
@@ -187,7 +189,8 @@ class LogRun {
     const size_t held = candidates.size();
     for (const bool driven : {true, false}) {
       for (size_t a = 0; a < axes_.size(); ++a) {
-        if (axes_[a].driven() != driven || log_.Find(a, LogQuantity::kPosition) == nullptr) continue;
+        if (axes_[a].driven() != driven || log_.Find(a, LogQuantity::kPosition) == nullptr)
+          continue;
         if (std::ranges::count(candidates, a) == 0) candidates.push_back(a);
       }
     }
@@ -207,8 +210,8 @@ class LogRun {
       }
     }
     if (!unused.empty()) {
-      log_.notes.push_back(fmt::format(
-          "not commanded, because the others determine it at home: {}", Joined(unused)));
+      log_.notes.push_back(fmt::format("not commanded, because the others determine it at home: {}",
+                                       Joined(unused)));
     }
     if (choice.left() <= 0) return CheckMotion();
     for (size_t a = 0; a < axes_.size(); ++a) {
@@ -288,13 +291,14 @@ class LogRun {
       const LogColumn& position = log_.Find(a, LogQuantity::kPosition)->column;
       std::string rate;
       if (Shapes(a)) {
-        rate = fmt::format(", rate: {{{}}}",
-                           ColumnKeys(name, log_.Find(a, LogQuantity::kVelocity)->column,
-                                      LogQuantity::kVelocity));
+        rate = fmt::format(
+            ", rate: {{{}}}",
+            ColumnKeys(name, log_.Find(a, LogQuantity::kVelocity)->column, LogQuantity::kVelocity));
       }
-      text += fmt::format("    {}: {{table: {{csv: {}, {}, time: \"time (s)\", smoothing: {}{}}}}}\n",
-                          QuotedYaml(name), csv, ColumnKeys(name, position, LogQuantity::kPosition),
-                          settings_.smoothing, rate);
+      text +=
+          fmt::format("    {}: {{table: {{csv: {}, {}, time: \"time (s)\", smoothing: {}{}}}}}\n",
+                      QuotedYaml(name), csv, ColumnKeys(name, position, LogQuantity::kPosition),
+                      settings_.smoothing, rate);
     }
     for (const size_t a : commands_.held) {
       text += fmt::format("    {}: home\n", QuotedYaml(robot_.names[a]));
@@ -314,7 +318,8 @@ class LogRun {
     for (const char c : fs::path(arguments_.log).stem().string()) {
       stem += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
     }
-    if (stem.empty() || std::isalpha(static_cast<unsigned char>(stem[0])) == 0) stem = "log_" + stem;
+    if (stem.empty() || std::isalpha(static_cast<unsigned char>(stem[0])) == 0)
+      stem = "log_" + stem;
     return stem.substr(0, kLongest);
   }
 
@@ -372,7 +377,8 @@ class LogRun {
       exit_code = WorseExit(exit_code, 1);
     }
     std::fflush(stdout);
-    if (!outcome.folder.empty() && !arguments_.quiet) Say(stderr, "results in {}\n", outcome.folder);
+    if (!outcome.folder.empty() && !arguments_.quiet)
+      Say(stderr, "results in {}\n", outcome.folder);
     const Comparison& judged = outcome.report->comparison;
     return WriteJson(exit_code, judged.verdict, judged.reason, outcome.folder, ToJson(comparison));
   }

@@ -4,22 +4,21 @@
 #include <cmath>
 #include <limits>
 
-
 namespace mbv {
 namespace {
 
 using Kind = LogTerm::Kind;
 
 constexpr size_t kFewestFitRows = 30;
-constexpr size_t kScanRows = 2000;    // by which the delay is searched for
-constexpr int kMostLags = 400;        // on either side
-constexpr double kRests = 1e-6;       // [rad or m] of a drive that holds still
-constexpr double kNearRest = 0.01;    // of the fastest rate: the sign is not known there
-constexpr double kChanges = 1e-4;     // of the log, by the longest delay
-constexpr double kAlike = 1e-3;       // what is left of a column that others explain
-constexpr double kSure = 3.0;         // standard errors
-constexpr double kMatters = 5e-3;     // of the log's RMS
-constexpr int kMostSteps = 30;        // of Gauss and Newton
+constexpr size_t kScanRows = 2000;  // by which the delay is searched for
+constexpr int kMostLags = 400;      // on either side
+constexpr double kRests = 1e-6;     // [rad or m] of a drive that holds still
+constexpr double kNearRest = 0.01;  // of the fastest rate: the sign is not known there
+constexpr double kChanges = 1e-4;   // of the log, by the longest delay
+constexpr double kAlike = 1e-3;     // what is left of a column that others explain
+constexpr double kSure = 3.0;       // standard errors
+constexpr double kMatters = 5e-3;   // of the log's RMS
+constexpr int kMostSteps = 30;      // of Gauss and Newton
 
 double RootMean(double sum2, size_t count) {
   return count == 0 ? kNan : std::sqrt(sum2 / static_cast<double>(count));
@@ -212,8 +211,8 @@ class LogFitter {
       const double from = term.kind == Kind::kGain ? 1.0 : 0.0;
       const double rms = X.col(i).norm() / std::sqrt(static_cast<double>(rows_.size()));
       term.effect = std::abs(term.value - from) * rms;
-      term.named = std::abs(term.value - from) > kSure * term.error &&
-                   term.effect > kMatters * fit_.rms_log;
+      term.named =
+          std::abs(term.value - from) > kSure * term.error && term.effect > kMatters * fit_.rms_log;
     }
   }
 
@@ -247,7 +246,8 @@ class LogFitter {
     }
     const MatX U = X * size.cwiseInverse().asDiagonal();
     const MatX A = (U.transpose() * U).ldlt().solve(MatX::Identity(p, p));
-    const MatX V = A * S * A * (static_cast<double>(n) / static_cast<double>(std::max<Eigen::Index>(n - p, 1)));
+    const MatX V = A * S * A *
+                   (static_cast<double>(n) / static_cast<double>(std::max<Eigen::Index>(n - p, 1)));
     VecX errors(p);
     for (Eigen::Index k = 0; k < p; ++k) errors[k] = std::sqrt(std::max(V(k, k), 0.0)) / size[k];
     return errors;
@@ -263,8 +263,8 @@ class LogFitter {
 }  // namespace
 
 const char* LogTerm::word() const {
-  static constexpr const char* kWords[] = {"gain",             "offset",           "delay",
-                                           "Coulomb friction", "viscous friction", "inertia"};
+  static constexpr const char* kWords[] = {
+      "gain", "offset", "delay", "Coulomb friction", "viscous friction", "inertia"};
   return kWords[static_cast<size_t>(kind)];
 }
 

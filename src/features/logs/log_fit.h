@@ -3,9 +3,9 @@
 //   y(t) = g m(t − τ) + o + Fc sign v(t − τ) + Fv v(t − τ) + J a(t − τ) + e(t)              (1)
 //
 // y: the log's force, m: the model's, v, a: rate and acceleration of the drive. τ > 0: the log's
-// force comes late. Fc, Fv > 0: the motor overcomes friction that the model does not have; J > 0: it
-// accelerates an inertia that it does not have. τ is searched for by correlation (the lag at which
-// (1) without it leaves least), then fitted with the rest by Gauss and Newton.
+// force comes late. Fc, Fv > 0: the motor overcomes friction that the model does not have; J > 0:
+// it accelerates an inertia that it does not have. τ is searched for by correlation (the lag at
+// which (1) without it leaves least), then fitted with the rest by Gauss and Newton.
 //
 // Standard errors are those of least squares with the correlation of e in time taken into account
 // [Newey 1987], up to the lag at which it first vanishes; neighbouring samples of a log say almost
@@ -23,8 +23,8 @@ namespace mbv {
 
 /// One drive's force by log and model.
 struct LogForce {
-  std::vector<double> time_s;  ///< increasing; rows without a number are not in it
-  std::vector<double> log;     ///< y [N or N m]
+  std::vector<double> time_s;           ///< increasing; rows without a number are not in it
+  std::vector<double> log;              ///< y [N or N m]
   const Piecewise* model = nullptr;     ///< m
   const Piecewise* velocity = nullptr;  ///< v and, as its rate, a
   double end_s = 0.0;                   ///< the model is known on 0 … end_s
@@ -43,7 +43,7 @@ struct LogTerm {
 };
 
 struct LogFit {
-  size_t rows = 0;       ///< compared
+  size_t rows = 0;  ///< compared
   double rms_log = kNan, rms_model = kNan;
   double rms_difference = kNan;  ///< of y − m
   double bias = kNan;            ///< mean of y − m

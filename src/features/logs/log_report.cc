@@ -38,7 +38,11 @@ class LogComparer {
   LogComparer(const RobotLog& log, const std::vector<LogAxis>& axes,
               const std::vector<std::string>& names, const std::vector<bool>& shaping,
               const Report& report, double most_delay_s)
-      : log_(log), axes_(axes), names_(names), shaping_(shaping), report_(report),
+      : log_(log),
+        axes_(axes),
+        names_(names),
+        shaping_(shaping),
+        report_(report),
         most_delay_s_(most_delay_s) {}
 
   LogComparison Compare() {
@@ -53,8 +57,8 @@ class LogComparer {
     result_.tables = report_.tables;
     result_.smoothed_forces = report_.smoothed_forces;
     for (const LogSeries& series : log_.series) {
-      result_.columns.push_back({SignalOf(series.column), series.column.heading,
-                                 series.column.unit});
+      result_.columns.push_back(
+          {SignalOf(series.column), series.column.heading, series.column.unit});
     }
     const WitnessRecord* model = ModelOf(report_);
     if (model == nullptr) return std::move(result_);
@@ -90,8 +94,8 @@ class LogComparer {
     const LogAxis& axis = axes_[series.column.axis];
     const bool drive = axis.coordinate.kind == Coordinate::Kind::kDrive;
     const std::string& name = names_[series.column.axis];
-    const int force = drive ? trace.Find(Quantity::kForce, name)
-                            : trace.Find(Quantity::kBaseForce, name);
+    const int force =
+        drive ? trace.Find(Quantity::kForce, name) : trace.Find(Quantity::kBaseForce, name);
     const int velocity = trace.Find(Quantity::kVelocity, name);
     if (axis.coordinate.kind == Coordinate::Kind::kJoint) {
       result_.notes.push_back(fmt::format("'{}' is not compared: no drive acts on {}",
@@ -153,8 +157,7 @@ class LogComparer {
     const std::string& name = names_[series.column.axis];
     int column = trace.Find(velocity ? Quantity::kVelocity : Quantity::kAcceleration, name);
     if (column < 0) {
-      column =
-          trace.Find(velocity ? Quantity::kJointVelocity : Quantity::kJointAcceleration, name);
+      column = trace.Find(velocity ? Quantity::kJointVelocity : Quantity::kJointAcceleration, name);
     }
     if (!IsFinite(trace, column)) return;
     const Piecewise model = SplineOf(trace, column);
@@ -185,7 +188,9 @@ class LogComparer {
   LogComparison result_;
 };
 
-std::string Short(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–"; }
+std::string Short(double value) {
+  return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–";
+}
 
 std::string UnitOfTerm(const LogTerm& term, const std::string& unit) {
   const bool turns = unit == "N m";
@@ -238,7 +243,8 @@ Table DriveTable(const LogComparison& comparison) {
   for (const LogDrive& drive : comparison.drives) {
     const LogFit& fit = drive.fit;
     table.rows.push_back(
-        {drive.name, drive.unit, Short(fit.rms_log), Short(fit.rms_model), Short(fit.rms_difference),
+        {drive.name, drive.unit, Short(fit.rms_log), Short(fit.rms_model),
+         Short(fit.rms_difference),
          std::isfinite(fit.share()) ? fmt::format("{:.2f} %", 100.0 * fit.share()) : "–",
          Short(fit.bias), Short(fit.correlation), Short(fit.rms_left)});
   }
@@ -265,26 +271,27 @@ std::string Sentence(const LogDrive& drive, const LogTerm& term, double step_s) 
     case Kind::kGain:
       return term.value < 0.0
                  ? fmt::format("gain {}: the log has the other sign", text)
-                 : fmt::format("gain {}: the log is so many times the model (torque constant, gear, "
-                               "masses)",
-                               text);
+                 : fmt::format(
+                       "gain {}: the log is so many times the model (torque constant, gear, "
+                       "masses)",
+                       text);
     case Kind::kOffset:
       return fmt::format("offset {}: zero of the torque sensor, or a weight or spring", text);
     case Kind::kDelay:
       return fmt::format("delay {} ({:.2f} rows): the log's torque comes {}", text,
                          term.value / step_s, term.value > 0.0 ? "late" : "early");
     case Kind::kCoulomb:
-      return fmt::format("hint: Coulomb friction {} {}", text,
-                         term.value > 0.0 ? "that the model does not have"
-                                          : "less than the model's");
+      return fmt::format(
+          "hint: Coulomb friction {} {}", text,
+          term.value > 0.0 ? "that the model does not have" : "less than the model's");
     case Kind::kViscous:
-      return fmt::format("hint: viscous friction {} {}", text,
-                         term.value > 0.0 ? "that the model does not have"
-                                          : "less than the model's");
+      return fmt::format(
+          "hint: viscous friction {} {}", text,
+          term.value > 0.0 ? "that the model does not have" : "less than the model's");
     case Kind::kInertia:
-      return fmt::format("hint: inertia {} {}", text,
-                         term.value > 0.0 ? "that the model does not have (a rotor?)"
-                                          : "less than the model's");
+      return fmt::format(
+          "hint: inertia {} {}", text,
+          term.value > 0.0 ? "that the model does not have (a rotor?)" : "less than the model's");
   }
   return "";
 }
@@ -312,8 +319,8 @@ Items Sentences(const LogComparison& comparison) {
       items.texts.push_back(drive.name + ": nothing beyond 3 standard errors and 0.5 % of the log");
     }
     if (!alike.empty()) {
-      items.texts.push_back(fmt::format("{}: this motion does not tell {} from the rest",
-                                        drive.name, Joined(alike)));
+      items.texts.push_back(
+          fmt::format("{}: this motion does not tell {} from the rest", drive.name, Joined(alike)));
     }
   }
   return items;
@@ -404,26 +411,28 @@ void AddPlots(const LogDrive& drive, ReportSection* section) {
 }
 
 std::string HeadLine(const LogComparison& comparison) {
-  return fmt::format("Log against model: {}, {} rows, {:.4g} s, {}{:.4g} s apart; model: {}; compared, "
-                     "not judged",
-                     comparison.name, comparison.rows, comparison.duration_s,
-                     comparison.even ? "" : "about ", comparison.step_s,
-                     comparison.witness.empty() ? "none ran" : comparison.witness);
+  return fmt::format(
+      "Log against model: {}, {} rows, {:.4g} s, {}{:.4g} s apart; model: {}; compared, "
+      "not judged",
+      comparison.name, comparison.rows, comparison.duration_s, comparison.even ? "" : "about ",
+      comparison.step_s, comparison.witness.empty() ? "none ran" : comparison.witness);
 }
 
 ReportSection ForceSection(const LogComparison& comparison) {
   ReportSection section{.title = "Log against model", .link = "Log"};
   if (comparison.drives.empty()) {
-    section.Add(Paragraph{comparison.witness.empty()
-                              ? "No witness gave forces: nothing is compared."
-                              : "The log has no forces that are compared: it gives the motion only."});
+    section.Add(
+        Paragraph{comparison.witness.empty()
+                      ? "No witness gave forces: nothing is compared."
+                      : "The log has no forces that are compared: it gives the motion only."});
     return section;
   }
   section.Add(DriveTable(comparison));
   section.Add(TermTable(comparison));
   section.Add(Sentences(comparison));
   section.Note(
-      "Fitted together by least squares: log = gain · model(t − delay) + offset + Coulomb · sign(v) "
+      "Fitted together by least squares: log = gain · model(t − delay) + offset + Coulomb · "
+      "sign(v) "
       "+ viscous · v + inertia · a. Standard errors count the correlation of what is left in time. "
       "Rows near rest (1 % of the fastest rate) are left out of the fit. What is named changes at "
       "least 0.5 % of the log's RMS, by 3 standard errors. Friction and inertia are hints: wrong "

@@ -14,12 +14,12 @@
 namespace mbv {
 namespace {
 
-constexpr size_t kFewestRows = 12;        // fewer show neither motion nor noise
-constexpr size_t kShownPlaces = 3;        // of one kind of fault
-constexpr double kManyMissing = 0.2;      // of the rows
-constexpr double kManyRepeated = 0.01;    // of the rows
+constexpr size_t kFewestRows = 12;           // fewer show neither motion nor noise
+constexpr size_t kShownPlaces = 3;           // of one kind of fault
+constexpr double kManyMissing = 0.2;         // of the rows
+constexpr double kManyRepeated = 0.01;       // of the rows
 constexpr double kGap = 10.0, kSlack = 1.5;  // of the median step
-constexpr double kSlowest_s = 0.5;        // between rows, where nothing says that it is seconds
+constexpr double kSlowest_s = 0.5;           // between rows, where nothing says that it is seconds
 constexpr int kMostDecimals = 12;
 
 // One row as it is read.
@@ -142,7 +142,8 @@ class LogReader {
         if (r + 1 == text.rows.size()) {
           Warn(line.number, "the last line is cut off and left out", "");
         } else {
-          cut_off.Add(line.number, 1, fmt::format("has {} of {} cells", cut.cells.size(), needed + 1));
+          cut_off.Add(line.number, 1,
+                      fmt::format("has {} of {} cells", cut.cells.size(), needed + 1));
         }
         continue;
       }
@@ -206,7 +207,8 @@ class LogReader {
     std::erase_if(log_.series, [&](const LogSeries& series) {
       const LogColumn& column = series.column;
       const bool position = column.quantity == LogQuantity::kPosition;
-      const bool none = std::ranges::none_of(series.values, [](double v) { return !std::isnan(v); });
+      const bool none =
+          std::ranges::none_of(series.values, [](double v) { return !std::isnan(v); });
       const bool zero = std::ranges::all_of(
           series.values, [&](double v) { return std::isnan(v) || v == column.shift; });
       if (none) {
@@ -216,14 +218,12 @@ class LogReader {
       if (!zero || position) return false;
       if (column.quantity == LogQuantity::kVelocity) {
         const LogSeries* moves = log_.Find(column.axis, LogQuantity::kPosition);
-        const bool rests =
-            moves != nullptr && std::ranges::all_of(moves->values, [&](double v) {
-              return std::isnan(v) || v == moves->values.front();
-            });
+        const bool rests = moves != nullptr && std::ranges::all_of(moves->values, [&](double v) {
+                             return std::isnan(v) || v == moves->values.front();
+                           });
         if (rests) return false;
       }
-      log_.notes.push_back(
-          fmt::format("'{}' is zero throughout and is not used", column.heading));
+      log_.notes.push_back(fmt::format("'{}' is zero throughout and is not used", column.heading));
       return true;
     });
   }
@@ -257,12 +257,12 @@ class LogReader {
     }
     const size_t missing = static_cast<size_t>(std::ranges::count(keep, false));
     if (missing == 0) return;
-    const size_t first =
-        static_cast<size_t>(std::ranges::find(keep, false) - keep.begin());
+    const size_t first = static_cast<size_t>(std::ranges::find(keep, false) - keep.begin());
     const double share = static_cast<double>(missing) / static_cast<double>(keep.size());
-    const std::string text = fmt::format("{} of {} rows lack a position or a velocity (empty or not "
-                                         "finite)",
-                                         missing, keep.size());
+    const std::string text = fmt::format(
+        "{} of {} rows lack a position or a velocity (empty or not "
+        "finite)",
+        missing, keep.size());
     if (share > kManyMissing) {
       Error(rows_[first].line, 1, text,
             "topics of several rates in one table? resample them to one time, or --ignore what is "
@@ -277,8 +277,9 @@ class LogReader {
     Faults back;
     for (size_t i = 1; i < rows_.size() && settings_.rate_hz == 0.0; ++i) {
       if (rows_[i].time_s >= rows_[i - 1].time_s) continue;
-      back.Add(rows_[i].line, 1,
-               fmt::format("the time goes back by {:.6g} s", rows_[i - 1].time_s - rows_[i].time_s));
+      back.Add(
+          rows_[i].line, 1,
+          fmt::format("the time goes back by {:.6g} s", rows_[i - 1].time_s - rows_[i].time_s));
     }
     if (back.count > 0) {
       Error(back.line, back.column, back.text + More(back.count),
@@ -334,11 +335,12 @@ class LogReader {
     const size_t left = static_cast<size_t>(std::ranges::count(keep, true));
     if (left < kFewestRows) {
       const double whole_s = rows_.empty() ? 0.0 : rows_.back().time_s;
-      Error(0, 0,
-            fmt::format("has {} rows{}, at least {} are needed", left,
-                        left == rows_.size() ? "" : fmt::format(" from {:g} to {:g} s", from_s, to_s),
-                        kFewestRows),
-            fmt::format("the log lasts {:.6g} s", whole_s));
+      Error(
+          0, 0,
+          fmt::format("has {} rows{}, at least {} are needed", left,
+                      left == rows_.size() ? "" : fmt::format(" from {:g} to {:g} s", from_s, to_s),
+                      kFewestRows),
+          fmt::format("the log lasts {:.6g} s", whole_s));
       return;
     }
     KeepRows(keep);
@@ -353,7 +355,8 @@ class LogReader {
       steps.push_back(rows_[i].time_s - rows_[i - 1].time_s);
     }
     std::vector<double> sorted = steps;
-    std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
+    std::ranges::nth_element(sorted,
+                             sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
     const double median = sorted[sorted.size() / 2];
     log_.step_s = median;
     if (clock_.assumed && median > kSlowest_s) {
@@ -376,7 +379,8 @@ class LogReader {
         }
         part = i + 1;
       } else if (std::abs(steps[i] - median) > (kSlack - 1.0) * median) {
-        uneven.Add(rows_[i + 1].line, 1, fmt::format("a row is {:.4g} s after the one before", steps[i]));
+        uneven.Add(rows_[i + 1].line, 1,
+                   fmt::format("a row is {:.4g} s after the one before", steps[i]));
       }
     }
     if (gaps.count > 0) {
@@ -419,8 +423,7 @@ class LogReader {
         }
         if (turns == 0.0) continue;
         series.values[i] = raw + turns * kTurn;
-        series.cells[i] =
-            fmt::format("{:.12f}", (series.values[i] - column.shift) / column.factor);
+        series.cells[i] = fmt::format("{:.12f}", (series.values[i] - column.shift) / column.factor);
       }
       if (jumps == 0) continue;
       Warn(rows_[first].line,
@@ -486,10 +489,11 @@ bool CheckLogRanges(const RobotLog& log, const std::vector<LogAxis>& axes,
     finding.file = log.file;
     finding.line = column.line;
     finding.column = column.character;
-    finding.message = fmt::format("'{}' runs from {:.5g} to {:.5g} {}, the range of {} is {:.5g} … "
-                                  "{:.5g} {}",
-                                  column.heading, low, high, axis.unit, axis.name(),
-                                  axis.range.lower, axis.range.upper, axis.unit);
+    finding.message = fmt::format(
+        "'{}' runs from {:.5g} to {:.5g} {}, the range of {} is {:.5g} … "
+        "{:.5g} {}",
+        column.heading, low, high, axis.unit, axis.name(), axis.range.lower, axis.range.upper,
+        axis.unit);
     finding.hint = degrees ? "as degrees all of it lies in the range: --degrees"
                            : "sign, unit or zero of the column? a map file states them (sign, "
                              "unit, offset); --ignore-ranges takes it as it is";

@@ -14,7 +14,7 @@ namespace mbv {
 /// A column with its numbers.
 struct LogSeries {
   LogColumn column;
-  std::vector<double> values;  ///< SI, one per row; NaN where the log has none
+  std::vector<double> values;      ///< SI, one per row; NaN where the log has none
   std::vector<std::string> cells;  ///< positions and velocities: as printed, with a decimal point
 };
 

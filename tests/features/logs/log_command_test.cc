@@ -89,9 +89,8 @@ class LogCommand : public testing::Test {
               "    right_motor: [home, {sine: {amplitude: 0.12, frequency_hz: 1.1, phase: 1}}, "
               "{sine: {amplitude: 0.06, frequency_hz: 0.5}}]\n"
               "analytic: none\nsimulation: {mode: inverse}\n");
-    const ProgramResult run =
-        mbverify("run " + File("truth/sines.yaml") + " --no-pictures --no-report --out " +
-                 File("truth/out"));
+    const ProgramResult run = mbverify("run " + File("truth/sines.yaml") +
+                                       " --no-pictures --no-report --out " + File("truth/out"));
     ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
     for (const auto& entry :
          std::filesystem::recursive_directory_iterator(mbverify.folder() / "truth/out")) {
@@ -133,9 +132,8 @@ class LogCommand : public testing::Test {
   }
 
   nlohmann::json Log(const std::string& log, const std::string& options = "", int exit_code = 0) {
-    result_ = mbverify("log " + File("five_bar.urdf") + " " + File(log) +
-                       " --no-pictures --out " + File("out") + " --json " + File("log.json") +
-                       " " + options);
+    result_ = mbverify("log " + File("five_bar.urdf") + " " + File(log) + " --no-pictures --out " +
+                       File("out") + " --json " + File("log.json") + " " + options);
     EXPECT_EQ(result_.exit_code, exit_code) << result_.out << result_.err;
     return nlohmann::json::parse(ReadAll(File("log.json")));
   }
@@ -159,7 +157,8 @@ TEST_F(LogCommand, ItsOwnForcesComeBackToTheInterpolationError) {
   }
   EXPECT_NE(result_.out.find("nothing beyond 3 standard errors"), std::string::npos) << result_.out;
   // Without velocities the spline of the positions has them.
-  WriteLog("bare.csv", [&](const std::string& m, size_t i) { return At(m, "force", i); }, false);
+  WriteLog(
+      "bare.csv", [&](const std::string& m, size_t i) { return At(m, "force", i); }, false);
   for (const auto& drive : Log("bare.csv")["log"]["drives"]) {
     EXPECT_LT(drive["share"].get<double>(), 1e-4) << drive;
   }

@@ -42,7 +42,8 @@ class LogFileTest : public testing::Test {
     std::string text = heading + "\n";
     for (int i = 0; i < rows; ++i) {
       text += fmt::format("{:.3f}", 0.01 * i);
-      for (int c = 1; c <= columns; ++c) text += fmt::format(",{:.6f}", 0.01 * std::sin(0.3 * i + c));
+      for (int c = 1; c <= columns; ++c)
+        text += fmt::format(",{:.6f}", 0.01 * std::sin(0.3 * i + c));
       text += "\n";
     }
     return text;
@@ -290,8 +291,8 @@ TEST_F(LogFileTest, CoarseStampsAreSpacedEvenlyOnRequest) {
 TEST_F(LogFileTest, TurnsOfEncodersAreTakenOut) {
   std::string text = "time,right_knee_pos\n";
   for (int i = 0; i < 60; ++i) {
-    text += fmt::format("{:.2f},{:.5f}\n", 0.01 * i,
-                        std::remainder(0.2 * i, 2.0 * std::numbers::pi));
+    text +=
+        fmt::format("{:.2f},{:.5f}\n", 0.01 * i, std::remainder(0.2 * i, 2.0 * std::numbers::pi));
   }
   const auto log = Read(text);
   ASSERT_TRUE(log) << Messages();
@@ -320,8 +321,7 @@ TEST_F(LogFileTest, WrongMapsAndOptionsAreFindings) {
     (void)Read(Table("time,left_knee_pos,x1"), settings);
     return Messages();
   };
-  EXPECT_NE(messages("colums: {}\njoints: [a]\n").find("unknown key 'colums'"),
-            std::string::npos);
+  EXPECT_NE(messages("colums: {}\njoints: [a]\n").find("unknown key 'colums'"), std::string::npos);
   EXPECT_EQ(messages("columns:\n  left_kne.velocity: x1\n"),
             "map.yaml:2:3: error: 'left_kne.velocity': the model has no drive or joint "
             "'left_kne'\n  hint: did you mean 'left_knee'?\n");

@@ -29,9 +29,7 @@ Piecewise SplineOf(const F& f) {
 
 // A drive that swings with two frequencies and carries a weight and an inertia.
 double Position(double t) { return 0.6 * std::sin(2.1 * t) + 0.2 * std::sin(5.3 * t + 0.4); }
-double Velocity(double t) {
-  return 1.26 * std::cos(2.1 * t) + 1.06 * std::cos(5.3 * t + 0.4);
-}
+double Velocity(double t) { return 1.26 * std::cos(2.1 * t) + 1.06 * std::cos(5.3 * t + 0.4); }
 double Acceleration(double t) {
   return -2.646 * std::sin(2.1 * t) - 5.618 * std::sin(5.3 * t + 0.4);
 }
@@ -57,7 +55,8 @@ class LogFitTest : public testing::Test {
                            unsigned seed = 1) const {
     std::mt19937_64 random(20261128 + seed);
     std::normal_distribution<double> normal(0.0, 1.0);
-    LogForce force{.time_s = {}, .log = {}, .model = &model_, .velocity = &velocity_, .end_s = kEnd};
+    LogForce force{
+        .time_s = {}, .log = {}, .model = &model_, .velocity = &velocity_, .end_s = kEnd};
     double e = 0.0;
     for (int i = 0; i * kStep <= kEnd + 1e-9; ++i) {
       const double t = i * kStep, s = t - change.delay_s;
@@ -95,14 +94,17 @@ TEST_F(LogFitTest, NamesWhatDiffersAndNothingElse) {
 }
 
 TEST_F(LogFitTest, TellsAllTermsTogetherFromEachOther) {
-  const Change change{.gain = 1.02, .offset = 0.3, .delay_s = kStep, .coulomb = 0.5, .viscous = 0.1,
+  const Change change{.gain = 1.02,
+                      .offset = 0.3,
+                      .delay_s = kStep,
+                      .coulomb = 0.5,
+                      .viscous = 0.1,
                       .inertia = 0.03};
   const LogFit exact = Fit(change), noisy = Fit(change, 0.1);
   for (size_t k = 0; k < exact.terms.size(); ++k) {
     const double truth = change.value(static_cast<Kind>(k));
     EXPECT_NEAR(exact.terms[k].value, truth, 1e-5) << exact.terms[k].word();
-    EXPECT_NEAR(noisy.terms[k].value, truth, 4.0 * noisy.terms[k].error)
-        << noisy.terms[k].word();
+    EXPECT_NEAR(noisy.terms[k].value, truth, 4.0 * noisy.terms[k].error) << noisy.terms[k].word();
     EXPECT_GT(noisy.terms[k].error, 0.0);
   }
   EXPECT_NEAR(noisy.rms_left, 0.1, 0.01);
@@ -132,8 +134,8 @@ TEST_F(LogFitTest, TheOtherSignIsAGain) {
 // A drive that carries nothing but an inertia: gain and inertia are one thing.
 TEST_F(LogFitTest, LeavesOutWhatTheMotionDoesNotTell) {
   const Piecewise inertial = SplineOf([](double t) { return 0.8 * Acceleration(t); });
-  LogForce force{.time_s = {}, .log = {}, .model = &inertial, .velocity = &velocity_,
-                 .end_s = kEnd};
+  LogForce force{
+      .time_s = {}, .log = {}, .model = &inertial, .velocity = &velocity_, .end_s = kEnd};
   for (int i = 0; i * kStep <= kEnd + 1e-9; ++i) {
     force.time_s.push_back(i * kStep);
     force.log.push_back(0.88 * Acceleration(i * kStep));
