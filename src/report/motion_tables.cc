@@ -16,10 +16,9 @@ constexpr double kReportedShare = 1e-4;
 
 std::string SmoothingText(const MotionTable& table) {
   if (!table.smoothed()) return "none";
-  return fmt::format("{}, deviation {:.2g} {}{}", table.smoothing, table.deviation, table.unit,
-                     std::isfinite(table.cutoff_hz)
-                         ? fmt::format(", halves {:.3g} Hz", table.cutoff_hz)
-                         : "");
+  return fmt::format(
+      "{}, deviation {:.2g} {}{}", table.smoothing, table.deviation, table.unit,
+      std::isfinite(table.cutoff_hz) ? fmt::format(", halves {:.3g} Hz", table.cutoff_hz) : "");
 }
 
 std::string KindText(const MotionTable& table) {

@@ -175,10 +175,11 @@ TEST_F(MotionTableTest, AStatedCutOffIsTheFilterThatIsDocumented) {
     EXPECT_NEAR(amplitude, 0.1 / (1.0 + std::pow(factor, 6)), 2e-4) << factor;
   }
   WriteTable("sine.csv", 801, 0.005, Swing);
-  EXPECT_NE(Messages("{table: {csv: sine.csv, column: angle, smoothing: {cutoff_hz: 100}}}",
-                     "sample_s: 0.01")
-                .find("smoothing.cutoff_hz = 100 violates < 100, half of the frequency of the rows"),
-            std::string::npos);
+  EXPECT_NE(
+      Messages("{table: {csv: sine.csv, column: angle, smoothing: {cutoff_hz: 100}}}",
+               "sample_s: 0.01")
+          .find("smoothing.cutoff_hz = 100 violates < 100, half of the frequency of the rows"),
+      std::string::npos);
 }
 
 TEST_F(MotionTableTest, ExactTablesAreNotDoubted) {

@@ -10,15 +10,16 @@ namespace {
 using Kind = LogTerm::Kind;
 
 constexpr size_t kFewestFitRows = 30;
-constexpr size_t kScanRows = 2000;  // by which the delay is searched for
-constexpr int kMostLags = 400;      // on either side
-constexpr double kRests = 1e-6;     // [rad or m] of a drive that holds still
-constexpr double kNearRest = 0.01;  // of the fastest rate: the sign is not known there
-constexpr double kChanges = 1e-4;   // of the log, by the longest delay
-constexpr double kAlike = 1e-3;     // what is left of a column that others explain
-constexpr double kSure = 3.0;       // standard errors
-constexpr double kMatters = 5e-3;   // of the log's RMS
-constexpr int kMostSteps = 30;      // of Gauss and Newton
+constexpr size_t kScanRows = 2000;      // by which the delay is searched for
+constexpr int kMostLags = 400;          // on either side
+constexpr double kRests = 1e-6;         // [rad or m] of a drive that holds still
+constexpr double kNearRest = 0.01;      // of the fastest rate: the sign is not known there
+constexpr double kChanges = 1e-4;       // of the log, by the longest delay
+constexpr double kAlike = 1e-3;         // what is left of a column that others explain
+constexpr double kSure = 3.0;           // standard errors
+constexpr double kMatters = 5e-3;       // of the log's RMS
+constexpr Eigen::Index kLagShare = 10;  // of the rows: longer correlations count as this one
+constexpr int kMostSteps = 30;          // of Gauss and Newton
 
 double RootMean(double sum2, size_t count) {
   return count == 0 ? kNan : std::sqrt(sum2 / static_cast<double>(count));
@@ -33,10 +34,15 @@ class LogFitter {
 
   LogFit Fit() {
     Compare();
-    ChooseRows();
+    // First away from every reversal that a delay could move, so that no sign is in doubt.
+    const double step_s =
+        force_.end_s / static_cast<double>(std::max<size_t>(force_.log.size(), 1));
+    ChooseRows(0.0, most_delay_s_);
+    if (rows_.size() < std::max(kFewestFitRows, force_.log.size() / 5)) ChooseRows(0.0, step_s);
     if (rows_.size() < kFewestFitRows || !(fit_.rms_log > 0.0)) return fit_;
-    const double scanned_s = Scan();
-    Refine(scanned_s);
+    const double delay_s = Refine(Scan(step_s));
+    ChooseRows(delay_s, step_s);
+    if (rows_.size() >= kFewestFitRows) (void)Refine(delay_s);
     return fit_;
   }
 
@@ -67,20 +73,27 @@ class LogFitter {
     if (spread > 0.0) fit_.correlation = (ym - y1 * m1 / count) / std::sqrt(spread);
   }
 
-  // Rows whose model is known for every delay, and whose direction is.
-  void ChooseRows() {
+  // Rows whose model is known for every delay, and whose direction is known and stays the same for
+  // `window_s` on either side.
+  void ChooseRows(double delay_s, double window_s) {
     double fastest = 0.0;
-    std::vector<double> rates(force_.time_s.size());
-    for (size_t i = 0; i < rates.size(); ++i) {
-      rates[i] = std::abs(Evaluate(*force_.velocity, force_.time_s[i]).value);
-      fastest = std::max(fastest, rates[i]);
+    for (const double t : force_.time_s) {
+      fastest = std::max(fastest, std::abs(Evaluate(*force_.velocity, t).value));
     }
     moves_ = fastest * force_.end_s > kRests;
+    const auto rate = [&](double t) { return Evaluate(*force_.velocity, t - delay_s).value; };
+    rows_.clear();
     double d2 = 0.0;
-    for (size_t i = 0; i < rates.size(); ++i) {
+    for (size_t i = 0; i < force_.time_s.size(); ++i) {
       const double t = force_.time_s[i];
       if (t < most_delay_s_ || t > force_.end_s - most_delay_s_) continue;
-      if (moves_ && rates[i] < kNearRest * fastest) continue;
+      if (moves_) {
+        const double now = rate(t);
+        if (std::abs(now) < kNearRest * fastest || now * rate(t - window_s) < 0.0 ||
+            now * rate(t + window_s) < 0.0) {
+          continue;
+        }
+      }
       rows_.push_back(i);
       const double difference = force_.log[i] - Model(i, 0.0);
       d2 += difference * difference;
@@ -141,17 +154,17 @@ class LogFitter {
   }
 
   // The delay at which gain, offset and friction leave least.
-  [[nodiscard]] double Scan() const {
+  [[nodiscard]] double Scan(double step_s) const {
     const size_t stride = std::max<size_t>(1, rows_.size() / kScanRows);
     std::vector<size_t> rows;
     for (size_t k = 0; k < rows_.size(); k += stride) rows.push_back(rows_[k]);
     const VecX y = LogOf(rows);
-    const double step_s = force_.end_s / static_cast<double>(force_.time_s.size());
-    const int lags =
-        std::min(kMostLags, std::max(1, static_cast<int>(most_delay_s_ / std::max(step_s, 1e-9))));
+    const int steps = std::max(1, static_cast<int>(most_delay_s_ / step_s));
+    const int lag_steps = 1 + (steps - 1) / kMostLags;
+    const int lags = steps / lag_steps;
     double best_s = 0.0, least = std::numeric_limits<double>::infinity();
     for (int lag = -lags; lag <= lags; ++lag) {
-      const double delay_s = most_delay_s_ * lag / lags;
+      const double delay_s = step_s * lag_steps * lag;
       const MatX columns = Columns(rows, delay_s, 1.0);
       const std::vector<int> taken =
           Separable(columns, {Kind::kOffset, Kind::kGain, Kind::kCoulomb, Kind::kViscous});
@@ -168,7 +181,8 @@ class LogFitter {
     return best_s;
   }
 
-  void Refine(double delay_s) {
+  // Everything of (1) from a first delay on; the delay.
+  double Refine(double delay_s) {
     const VecX y = LogOf(rows_);
     double gain = 1.0;
     MatX columns = Columns(rows_, delay_s, gain);
@@ -214,6 +228,7 @@ class LogFitter {
       term.named =
           std::abs(term.value - from) > kSure * term.error && term.effect > kMatters * fit_.rms_log;
     }
+    return delays ? delay_s : 0.0;
   }
 
   static double CoefficientOf(const VecX& c, const std::vector<int>& taken, Kind kind,
@@ -227,7 +242,7 @@ class LogFitter {
     const Eigen::Index n = X.rows(), p = X.cols();
     const double power = e.squaredNorm();
     Eigen::Index lags = 0;
-    const Eigen::Index most = n / 4;
+    const Eigen::Index most = n / kLagShare;
     while (lags < most) {
       const Eigen::Index k = lags + 1;
       if (e.head(n - k).dot(e.tail(n - k)) <= 0.0) break;

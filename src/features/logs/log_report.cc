@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/json_text.h"
 #include "base/roles.h"
 #include "base/text.h"
 #include "plot/svg_plot.h"
@@ -215,6 +214,10 @@ std::string Estimate(double value, double error, double scale = 1.0) {
   if (!std::isfinite(value)) return "–";
   value *= scale;
   error *= scale;
+  constexpr double kFinest = 1e-5;
+  if (error < kFinest) {
+    return fmt::format("{:.6g} ± {:.0e}", std::abs(value) < kFinest ? 0.0 : value, error);
+  }
   int decimals = 4;
   if (error > 0.0 && std::isfinite(error)) {
     decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 6);

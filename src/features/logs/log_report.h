@@ -1,11 +1,11 @@
 // A robot's log against the model: what was measured of each drive beside what the model needs.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/json_text.h"
 #include "features/logs/log_fit.h"
 #include "features/logs/log_rows.h"
 #include "report/report.h"

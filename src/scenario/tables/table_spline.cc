@@ -16,9 +16,10 @@ constexpr int kLooks = 4;      // in each interval
 
 // Three rounds of a periodic table, the middle one at its own times.
 SplineRows Repeated(const SplineRows& rows, double advance) {
-  SplineRows all{
-      .deviation = rows.deviation, .rate_deviation = rows.rate_deviation, .stated = rows.stated,
-      .cutoff_hz = rows.cutoff_hz};
+  SplineRows all{.deviation = rows.deviation,
+                 .rate_deviation = rows.rate_deviation,
+                 .stated = rows.stated,
+                 .cutoff_hz = rows.cutoff_hz};
   const size_t last = rows.time_s.size() - 1;
   const double period_s = rows.time_s[last] - rows.time_s[0];
   const auto add = [&](size_t i, double time_s, double more) {
@@ -93,8 +94,7 @@ class RowFit {
     const double rate_weight = rows_.rates.empty() ? 0.0 : data_[1].weight;
     const double whole_s = rows_.time_s.back() - rows_.time_s.front();
     const double step_s = whole_s / static_cast<double>(rows_.time_s.size() - 1);
-    const double weight2 =
-        data_[0].weight * data_[0].weight + rate_weight * rate_weight * w * w;
+    const double weight2 = data_[0].weight * data_[0].weight + rate_weight * rate_weight * w * w;
     return weight2 / (step_s * std::pow(w, 6));
   }
 
