@@ -102,8 +102,8 @@ class LogComparer {
       return;
     }
     if (!IsFinite(trace, force) || !IsFinite(trace, velocity)) {
-      result_.notes.push_back(fmt::format("'{}' is not compared: the model's force is not known",
-                                          series.column.heading));
+      result_.notes.push_back(fmt::format(
+          "'{}' is not compared: the model has no force or rate of it", series.column.heading));
       return;
     }
     const Piecewise model = SplineOf(trace, force), rate = SplineOf(trace, velocity);

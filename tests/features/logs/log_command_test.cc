@@ -6,6 +6,8 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <random>
 #include <sstream>
 
 #include "tests/support/run_program.h"
@@ -212,6 +214,49 @@ TEST_F(LogCommand, WhatALogDiffersByIsNamedWithItsNumber) {
       << result_.out;
   // Compared, not judged; unless asked for.
   (void)Log("worn.csv", "--limit 0.01", 1);
+}
+
+// An array of ROS with an encoder of 8192 counts, a clock that jitters and noise of the torques:
+// gain and friction within 4 of their standard errors, which are small.
+TEST_F(LogCommand, EncodersAndNoiseLeaveTheNumbersWithinTheirErrors) {
+  RunMotion();
+  std::mt19937_64 random(20261128);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const double count = 2.0 * std::numbers::pi / 8192;
+  std::string text =
+      "%time,field.name0,field.name1,field.position0,field.position1,field.effort0,"
+      "field.effort1\n";
+  for (size_t i = 0; i < truth_.at("time_s").size(); ++i) {
+    const auto jitter_ns = static_cast<long long>(2e5 * normal(random));
+    text +=
+        std::to_string(1700000000000000000LL + 4000000LL * static_cast<long long>(i) + jitter_ns);
+    text += ",right_motor,left_motor";
+    for (const char* motor : {"right_motor", "left_motor"}) {
+      text += "," + std::to_string(count * std::round(At(motor, "position", i) / count));
+    }
+    const double v = At("left_motor", "velocity", i);
+    text += "," + std::to_string(At("right_motor", "force", i) + 0.03 * normal(random));
+    text += "," +
+            std::to_string(1.05 * At("left_motor", "force", i) + 0.08 * (v > 0 ? 1 : -1) +
+                           0.03 * normal(random)) +
+            "\n";
+  }
+  Write("bag.csv", text);
+  const auto json = Log("bag.csv");
+  EXPECT_EQ(json["verdict"], "agree");
+  const std::map<std::string, double> truth = {{"gain", 1.05}, {"Coulomb friction", 0.08}};
+  for (const auto& drive : json["log"]["drives"]) {
+    EXPECT_NEAR(drive["rms_left"].get<double>(), 0.03, 0.004) << drive["drive"];
+    for (const auto& term : drive["terms"]) {
+      const bool changed = drive["drive"] == "left_motor" && truth.contains(term["term"]);
+      const double value = changed ? truth.at(term["term"]) : term["term"] == "gain" ? 1.0 : 0.0;
+      EXPECT_EQ(term["named"].get<bool>(), changed) << drive["drive"] << term;
+      EXPECT_NEAR(term["value"].get<double>(), value, 4.0 * term["standard_error"].get<double>())
+          << drive["drive"] << term;
+      if (!changed) continue;
+      EXPECT_LT(term["standard_error"].get<double>(), 0.1 * value) << term;
+    }
+  }
 }
 
 TEST_F(LogCommand, BadInputWritesNothing) {
