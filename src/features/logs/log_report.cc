@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/roles.h"
 #include "base/text.h"
@@ -16,7 +17,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Kind = LogTerm::Kind;
 
+constexpr size_t kNamed = 8;          // in a note at most
 constexpr size_t kFewestSamples = 6;  // that a spline takes
+constexpr double kNoisy = 0.03;       // of the accelerations: the model's forces follow it
 constexpr size_t kScatter = 800;      // points of a drawing without time
 
 // The witness whose forces are the model's: the reference, else a closed form, else the simulation.
@@ -59,6 +62,7 @@ class LogComparer {
       result_.columns.push_back(
           {SignalOf(series.column), series.column.heading, series.column.unit});
     }
+    NoteNoise();
     const WitnessRecord* model = ModelOf(report_);
     if (model == nullptr) return std::move(result_);
     result_.witness = model->name;
@@ -73,6 +77,21 @@ class LogComparer {
   }
 
  private:
+  // Least squares takes the model for exact: its noise biases what is fitted.
+  void NoteNoise() {
+    std::vector<std::string> noisy;
+    for (const MotionTable& table : report_.tables) {
+      const double share = AccelerationNoise(table) / table.acceleration_rms;
+      if (share > kNoisy) noisy.push_back(fmt::format("{} {:.0f} %", table.name, 100.0 * share));
+    }
+    if (noisy.empty()) return;
+    result_.notes.push_back(
+        fmt::format("noise is left in the accelerations that the model's forces follow ({}): "
+                    "delay, friction and "
+                    "inertia may be off by more than their standard errors; smooth more (--cutoff)",
+                    Joined(noisy, kNamed)));
+  }
+
   [[nodiscard]] std::string SignalOf(const LogColumn& column) const {
     return axes_[column.axis].name() + "." + kLogQuantities[static_cast<size_t>(column.quantity)];
   }
@@ -341,14 +360,16 @@ Table RateTable(const LogComparison& comparison) {
 }
 
 Table SmoothingTable(const LogComparison& comparison) {
-  Table table{.caption = "How positions were made a motion",
-              .columns = {Text("of"), Text("smoothing"), Digits("halves [Hz]"),
-                          Digits("noise [rad or m]"), Digits("changes positions (RMS)"),
-                          Digits("changes accelerations (RMS)"), Digits("accelerations (RMS)")}};
+  Table table{
+      .caption = "How positions were made a motion",
+      .columns = {Text("of"), Text("smoothing"), Digits("halves [Hz]"), Digits("noise [rad or m]"),
+                  Digits("changes positions (RMS)"), Digits("changes accelerations (RMS)"),
+                  Digits("noise left in them (RMS)"), Digits("accelerations (RMS)")}};
   for (const MotionTable& motion : comparison.tables) {
     table.rows.push_back({motion.name, motion.smoothing, Short(motion.cutoff_hz),
                           Short(motion.deviation), Short(motion.change_rms),
-                          Short(motion.acceleration_change_rms), Short(motion.acceleration_rms)});
+                          Short(motion.acceleration_change_rms), Short(AccelerationNoise(motion)),
+                          Short(motion.acceleration_rms)});
   }
   return table;
 }
@@ -444,6 +465,14 @@ ReportSection ForceSection(const LogComparison& comparison) {
 }
 
 }  // namespace
+
+double AccelerationNoise(const MotionTable& table) {
+  if (table.with_rates || !std::isfinite(table.cutoff_hz)) return kNan;
+  constexpr double kFilter = std::numbers::pi / 18.0;
+  const double step_s = (table.to_s - table.from_s) / static_cast<double>(table.rows - 1);
+  return table.deviation * std::sqrt(2.0 * step_s * kFilter) * std::pow(2.0 * std::numbers::pi, 2) *
+         std::pow(table.cutoff_hz, 2.5);
+}
 
 LogComparison CompareLog(const RobotLog& log, const std::vector<LogAxis>& axes,
                          const std::vector<std::string>& names, const std::vector<bool>& shaping,

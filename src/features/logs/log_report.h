@@ -42,6 +42,12 @@ struct LogComparison {
   std::vector<std::string> notes;
 };
 
+/// RMS of the noise that smoothing leaves in the second derivative [unit/s²]: white noise of
+/// deviation σ in rows a time h apart, passed by 1/(1 + (f/f₀)⁶) and differentiated twice, is
+///   σ √(2 h K) (2π)² f₀^(5/2),  K = ∫₀^∞ x⁴/(1 + x⁶)² dx = π/18.
+/// NaN where rates shape the spline, or nothing is smoothed.
+[[nodiscard]] double AccelerationNoise(const MotionTable& table);
+
 /// `names`: what the run's model calls the axes.
 [[nodiscard]] LogComparison CompareLog(const RobotLog& log, const std::vector<LogAxis>& axes,
                                        const std::vector<std::string>& names,

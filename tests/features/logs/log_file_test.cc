@@ -4,10 +4,13 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "base/text.h"
+#include "features/logs/log_report.h"
 #include "features/logs/log_rows.h"
 #include "model_file/load_model.h"
+#include "scenario/tables/table_spline.h"
 #include "tests/support/test_folder.h"
 
 namespace mbv {
@@ -309,6 +312,29 @@ TEST_F(LogFileTest, RangesAreHeldAgainstTheUnit) {
   EXPECT_EQ(Messages(),
             "log.csv:1:6: error: 'left_knee_pos' runs from 0 to 38 rad, the range of left_knee is "
             "-1 … 1 rad\n  hint: as degrees all of it lies in the range: --degrees\n");
+}
+
+// The noise that a smoothing spline leaves in accelerations, by its formula and by 20 000 rows,
+// whose RMS varies by about 1/√(f₀ T).
+TEST_F(LogFileTest, NoiseLeftInAccelerationsIsKnown) {
+  std::mt19937_64 random(20261128);
+  std::normal_distribution<double> normal(0.0, 1e-3);
+  for (const double cutoff_hz : {5.0, 12.0, 25.0}) {
+    SplineRows rows{.time_s = {}, .values = {}, .deviation = 1e-3, .cutoff_hz = cutoff_hz};
+    for (int i = 0; i < 20000; ++i) {
+      rows.time_s.push_back(0.004 * i);
+      rows.values.push_back(normal(random));
+    }
+    MotionTable table;
+    table.rows = rows.time_s.size();
+    table.to_s = rows.time_s.back();
+    table.deviation = 1e-3;
+    table.cutoff_hz = cutoff_hz;
+    const double noise = AccelerationNoise(table);
+    EXPECT_NEAR(SizeOf(Smoothed(rows), rows.time_s).rms.acceleration, noise,
+                2.0 * noise / std::sqrt(cutoff_hz * table.to_s))
+        << cutoff_hz;
+  }
 }
 
 TEST_F(LogFileTest, WrongMapsAndOptionsAreFindings) {
