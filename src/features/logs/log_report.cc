@@ -20,6 +20,7 @@ using Kind = LogTerm::Kind;
 constexpr size_t kNamed = 8;          // in a note at most
 constexpr size_t kFewestSamples = 6;  // that a spline takes
 constexpr double kNoisy = 0.03;       // of the accelerations: the model's forces follow it
+constexpr double kAboutOne = 0.3;     // a sign, and what else is wrong
 constexpr size_t kScatter = 800;      // points of a drawing without time
 
 // The witness whose forces are the model's: the reference, else a closed form, else the simulation.
@@ -291,12 +292,15 @@ std::string Sentence(const LogDrive& drive, const LogTerm& term, double step_s) 
   const std::string text = TermText(term, drive.unit);
   switch (term.kind) {
     case Kind::kGain:
-      return term.value < 0.0
-                 ? fmt::format("gain {}: the log has the other sign", text)
-                 : fmt::format(
-                       "gain {}: the log is so many times the model (torque constant, gear, "
-                       "masses)",
-                       text);
+      if (std::abs(term.value + 1.0) < kAboutOne) {
+        return fmt::format("gain {}: the log has the other sign", text);
+      }
+      if (term.value < 0.0) {
+        return fmt::format("gain {}: the log does not follow the model (loads, parameters: --set)",
+                           text);
+      }
+      return fmt::format(
+          "gain {}: the log is so many times the model (torque constant, gear, masses)", text);
     case Kind::kOffset:
       return fmt::format("offset {}: zero of the torque sensor, or a weight or spring", text);
     case Kind::kDelay:

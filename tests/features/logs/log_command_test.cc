@@ -171,7 +171,9 @@ TEST_F(LogCommand, ItsOwnForcesComeBackToTheInterpolationError) {
   // Without velocities the spline of the positions has them.
   WriteLog(
       "bare.csv", [&](const std::string& m, size_t i) { return At(m, "force", i); }, false);
-  for (const auto& drive : Log("bare.csv", "--smoothing none")["log"]["drives"]) {
+  const auto bare = Log("bare.csv", "--smoothing none");
+  ASSERT_EQ(bare["log"]["drives"].size(), 2u);
+  for (const auto& drive : bare["log"]["drives"]) {
     EXPECT_LT(drive["share"].get<double>(), 1e-4) << drive;
   }
   const std::filesystem::path folder = mbverify.folder() / "out/five_bar/setup/bare";
@@ -257,6 +259,31 @@ TEST_F(LogCommand, EncodersAndNoiseLeaveTheNumbersWithinTheirErrors) {
       EXPECT_LT(term["standard_error"].get<double>(), 0.1 * value) << term;
     }
   }
+}
+
+// What acted on the robot is no part of its log: --set states it.
+TEST_F(LogCommand, LoadsAndParametersAreStated) {
+  const ProgramResult run =
+      mbverify("run scara_robot/axis --no-pictures --no-report --out " + File("truth"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto largest = [&](const std::string& options) {
+    const ProgramResult logged =
+        mbverify("log scara_robot " + File("truth/scara_robot/axis/traces.csv") +
+                 " --no-pictures --out " + File("out") + " --json " + File("log.json") + options);
+    EXPECT_EQ(logged.exit_code, 0) << logged.err;
+    double share = 0.0;
+    const auto json = nlohmann::json::parse(ReadAll(File("log.json")));
+    EXPECT_EQ(json["log"]["drives"].size(), 4u);
+    for (const auto& drive : json["log"]["drives"]) {
+      share = std::max(share, drive["share"].get<double>());
+    }
+    return share;
+  };
+  EXPECT_GT(largest(""), 0.5);
+  EXPECT_LT(largest(" --set parameters.home_x=-0.05 --set parameters.home_y=-0.05 --set "
+                    "parameters.home_z=-0.13 --set parameters.home_phi=pi/12 --set 'loads={tool: "
+                    "{on: platform.P, force: [0, 0, -5]}}'"),
+            1e-5);
 }
 
 TEST_F(LogCommand, BadInputWritesNothing) {
