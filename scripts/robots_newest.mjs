@@ -1,0 +1,354 @@
+// How MJCF files are imported, held against the newest MuJoCo (npm's @mujoco/mujoco) on the files as
+// they are:
+//
+//   node scripts/robots_newest.mjs MBVERIFY FOLDER…
+//
+// mbverify imports every MJCF file below the folders and runs its first motion; the newest MuJoCo
+// compiles the original. Compared are masses, centres of mass and inertias, poses at home, and the
+// drive forces at rest at home (gravity) and along the motion. MuJoCo closes the loops itself:
+//
+//   r(q) = 0, q_d = x;  J q̇ = (0, ẋ);  J q̈ = (−J̇q̇, ẍ)                                         (1)
+//
+// with the file's equalities r and the drives' coordinates q_d, and τ of mj_inverse without
+// constraints is shared out to loops and drives, Jᵀ(λ, F) = τ + friction.                          (2)
+//
+// Prints a Markdown table. Exit code: 0 all within the limits or explained, 1 otherwise, 77 without
+// npm's package.
+import {execFileSync} from 'node:child_process';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import {pathToFileURL} from 'node:url';
+
+import {leastSolution} from '../examples/witness/mujoco/algebra.mjs';
+import {load, messageOf, Refused} from '../examples/witness/mujoco/engine.mjs';
+
+export const COMPILED = 1e-9, MOVING = 1e-6;  // limits, relative
+const STATES = 12;                            // samples of a motion
+const AT_REST = 1e-9;                         // rates without dry friction [rad/s, m/s]
+
+const sum = (list) => list.reduce((a, b) => a + b, 0);
+const norm = (list) => Math.sqrt(sum(list.map((x) => x * x)));
+const minus = (a, b) => a.map((x, i) => x - b[i]);
+
+/** Rows of the rotation of a unit quaternion (w, x, y, z). */
+export function rotation([w, x, y, z]) {
+  return [
+    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+  ];
+}
+
+/** R diag(d) Rᵀ, as nine numbers. */
+export const turned = (R, d) =>
+    [0, 1, 2].flatMap((i) => [0, 1, 2].map((j) => sum(d.map((x, k) => R[i][k] * x * R[j][k]))));
+
+/** A unit quaternion of a rotation's rows. */
+export function quaternion(R) {
+  const candidates = [
+    [1 + R[0][0] + R[1][1] + R[2][2], R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1]],
+    [R[2][1] - R[1][2], 1 + R[0][0] - R[1][1] - R[2][2], R[0][1] + R[1][0], R[0][2] + R[2][0]],
+    [R[0][2] - R[2][0], R[0][1] + R[1][0], 1 - R[0][0] + R[1][1] - R[2][2], R[1][2] + R[2][1]],
+    [R[1][0] - R[0][1], R[0][2] + R[2][0], R[1][2] + R[2][1], 1 - R[0][0] - R[1][1] + R[2][2]],
+  ];
+  const best = candidates.reduce((a, b) => (norm(b) > norm(a) ? b : a)), size = norm(best);
+  return best.map((x) => x / size);
+}
+
+const times = ([a, b, c, d], [e, f, g, h]) =>
+    [a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e];
+
+// Roll, pitch and yaw about fixed axes.
+function ofAngles([roll, pitch, yaw]) {
+  const about = (axis, angle) => [Math.cos(angle / 2), ...[0, 1, 2].map((i) => (i === axis ? Math.sin(angle / 2) : 0))];
+  return times(times(about(2, yaw), about(1, pitch)), about(0, roll));
+}
+
+// As model files write it.
+const asWritten = (name) => name.replace(/[^A-Za-z0-9_.-]/g, '_');
+
+/** A robot of the newest MuJoCo beside the mechanism that mbverify made of its file. */
+export class Robot {
+  constructor({mj}, model, mechanism) {
+    const data = new mj.MjData(model);
+    Object.assign(this, {mj, model, mechanism, data});
+    const {mjtObj, mjtDisableBit: off} = mj;
+    const name = (type, id, kind) => {
+      const given = mj.mj_id2name(model, type.value, id);  // not a text where there is none
+      return given && mj.mj_name2id(model, type.value, given) === id ? asWritten(given) : `${kind}_${id}`;
+    };
+    const named = (type, count, kind) => Object.fromEntries([...Array(count).keys()].map((id) => [name(type, id, kind), id]));
+    this.bodies = named(mjtObj.mjOBJ_BODY, model.nbody, 'body');
+    this.joints = named(mjtObj.mjOBJ_JOINT, model.njnt, 'joint');
+    // Friction is added here; what the import leaves out of contacts, limits and fluids is off.
+    this.constrained = off.mjDSBL_CONTACT.value | off.mjDSBL_LIMIT.value | off.mjDSBL_FRICTIONLOSS.value;
+    this.unconstrained = this.constrained | off.mjDSBL_CONSTRAINT.value;
+    this.flags = model.opt.disableflags;
+    this.frictionless = (this.flags & (off.mjDSBL_FRICTIONLOSS.value | off.mjDSBL_CONSTRAINT.value)) !== 0;
+    model.opt.enableflags = 0;
+    model.opt.density = model.opt.viscosity = 0;
+    if ('jacobian' in model.opt) model.opt.jacobian = mj.mjtJacobian.mjJAC_DENSE.value;
+    // Equalities that are loops or couplings there.
+    const known = new Set([...mechanism.joints, ...mechanism.couplings].map((one) => one.name));
+    this.loose = [...Array(model.neq).keys()].filter((id) => !known.has(this.equalityName(id)));
+    this.held = this.heldDofs();
+    this.drives = mechanism.drives.map((drive) => this.place(drive));
+  }
+
+  equalityName(id) {
+    const {mj, model} = this, type = mj.mjtObj.mjOBJ_EQUALITY.value, given = mj.mj_id2name(model, type, id);
+    if (given && mj.mj_name2id(model, type, given) === id) return asWritten(given);
+    if (model.eq_objtype[id] === mj.mjtObj.mjOBJ_SITE.value) {
+      const site = (object) => asWritten(mj.mj_id2name(model, mj.mjtObj.mjOBJ_SITE.value, object));
+      return `${site(model.eq_obj1id[id])}_${site(model.eq_obj2id[id])}`;
+    }
+    return `equality_${id}`;
+  }
+
+  // Of free joints whose bodies are held there.
+  heldDofs() {
+    const {mj, model, mechanism} = this, dofs = [];
+    for (const [name, id] of Object.entries(this.joints)) {
+      const joint = mechanism.joints.find((one) => one.name === name);
+      if (model.jnt_type[id] !== mj.mjtJoint.mjJNT_FREE.value || joint?.kind === 'free') continue;
+      for (let i = 0; i < 6; i++) dofs.push(model.jnt_dofadr[id] + i);
+    }
+    return dofs;
+  }
+
+  place(drive) {
+    const id = drive.on === undefined ? undefined : this.joints[drive.on.joint];
+    if (id === undefined) throw new Refused(`drive '${drive.name}' is on no joint of the file`);
+    return {name: drive.name, dof: this.model.jnt_dofadr[id], at: this.model.jnt_qposadr[id]};
+  }
+
+  /** Largest differences of masses, centres and inertias, relative, and where: [[value, where], …]. */
+  compareBodies() {
+    const {model} = this, total = sum(this.mechanism.bodies.map((body) => body.mass));
+    const worst = {mass: [0, ''], centre: [0, ''], inertia: [0, '']};
+    const note = (kind, value, where) => { if (!(value <= worst[kind][0])) worst[kind] = [value, where]; };
+    note('mass', Math.abs(sum(Array.from(model.body_mass.slice(1))) - total) / total, 'in all');
+    for (const body of this.mechanism.bodies.slice(1)) {
+      const id = this.bodies[body.name];
+      if (id === undefined) {  // a piece between joints
+        if (body.mass !== 0) note('mass', 1, body.name);
+        continue;
+      }
+      const mass = model.body_mass[id], I = turned(rotation(model.body_iquat.slice(4 * id, 4 * id + 4)), Array.from(model.body_inertia.slice(3 * id, 3 * id + 3)));
+      if (mass === 0 && body.mass === 0) continue;
+      const gyration = Math.sqrt(norm(I) / mass), centre = Array.from(model.body_ipos.slice(3 * id, 3 * id + 3));
+      note('mass', Math.abs(mass - body.mass) / mass, body.name);
+      note('centre', norm(minus(centre, body.centre_of_mass)) / Math.max(norm(centre), gyration), body.name);
+      note('inertia', norm(minus(I, body.inertia.flat())) / norm(I), body.name);
+    }
+    return worst;
+  }
+
+  /** Puts MuJoCo into the mechanism's home pose. */
+  goHome() {
+    const {mj, model, mechanism, data} = this, type = mj.mjtJoint;
+    mj.mj_resetData(model, data);
+    const qpos = Array.from(model.qpos0);
+    for (const [name, id] of Object.entries(this.joints)) {
+      const joint = mechanism.joints.find((one) => one.name === name), at = model.jnt_qposadr[id];
+      const body = this.nameOf(model.jnt_bodyid[id]);
+      switch (model.jnt_type[id]) {
+        case type.mjJNT_FREE.value: {
+          const home = mechanism.bodies.find((one) => one.name === body).home;
+          qpos.splice(at, 7, ...home.p, ...quaternion(home.R));
+          break;
+        }
+        case type.mjJNT_BALL.value:
+          qpos.splice(at, 4, ...times(qpos.slice(at, at + 4), ofAngles(joint.home)));
+          break;
+        default:
+          qpos[at] += joint.home[0];
+      }
+    }
+    data.qpos.set(qpos);
+    for (const id of this.loose) data.eq_active[id] = 0;
+  }
+
+  nameOf(body) { return Object.keys(this.bodies).find((name) => this.bodies[name] === body); }
+
+  /** Largest distance of bodies' poses at home, of the robot's size; and where. */
+  comparePoses() {
+    const {mj, model, mechanism, data} = this;
+    mj.mj_kinematics(model, data);
+    const size = Math.max(...mechanism.bodies.map((body) => norm(body.home.p)), 1e-3);
+    let worst = [0, ''];
+    for (const body of mechanism.bodies.slice(1)) {
+      const id = this.bodies[body.name];
+      if (id === undefined) continue;
+      const p = Array.from(data.xpos.slice(3 * id, 3 * id + 3)), R = Array.from(data.xmat.slice(9 * id, 9 * id + 9));
+      const apart = Math.max(norm(minus(p, body.home.p)) / size, norm(minus(R, body.home.R.flat())));
+      if (!(apart <= worst[0])) worst = [apart, body.name];
+    }
+    return worst;
+  }
+
+  // Equality rows at the present position, then those that are held and driven.
+  rows() {
+    const {mj, model, data} = this, nv = model.nv;
+    model.opt.disableflags = this.flags | this.constrained;
+    mj.mj_fwdPosition(model, data);
+    const unit = (dof) => Float64Array.from({length: nv}, (_, i) => (i === dof ? 1 : 0));
+    const J = data.efc_J;
+    return {
+      pos: Array.from(data.efc_pos.slice(0, data.ne)),
+      J: [...Array.from({length: data.ne}, (_, r) => J.slice(r * nv, (r + 1) * nv)),
+          ...this.held.map(unit), ...this.drives.map((drive) => unit(drive.dof))],
+    };
+  }
+
+  // (1): positions, by Newton's method from where it is.
+  close(x) {
+    const {mj, model, data} = this;
+    for (let i = 0; i < 40; i++) {
+      const {pos, J} = this.rows();
+      const apart = this.drives.map((drive, k) => data.qpos[drive.at] - model.qpos0[drive.at] - x[k]);
+      const gap = [...pos, ...this.held.map(() => 0), ...apart];
+      const largest = Math.max(0, ...gap.map(Math.abs));
+      if (largest < 1e-14) return 0;
+      if (i === 39) return largest;
+      const step = leastSolution(J, gap.map((value) => -value));
+      const qpos = mj.DoubleBuffer.FromArray(Array.from(data.qpos));
+      mj.mj_integratePos(model, qpos, Array.from(step), 1);
+      data.qpos.set(qpos.GetView());
+      qpos.delete();
+    }
+    return Infinity;
+  }
+
+  /** (1), (2): drive forces for drives' positions, rates and accelerations, and the gap left. */
+  driveForces(x, rate, acceleration) {
+    const {mj, model, data} = this, none = this.held.map(() => 0);
+    const gap = this.close(x), {J} = this.rows(), ne = data.ne;
+    data.qvel.set(leastSolution(J, [...Array(ne).fill(0), ...none, ...rate]));
+    mj.mj_forward(model, data);
+    const bias = Array.from({length: ne}, (_, r) => -data.efc_aref[r] - data.efc_KBIP[4 * r + 1] * data.efc_vel[r] -
+        data.efc_KBIP[4 * r] * data.efc_KBIP[4 * r + 2] * data.efc_pos[r]);
+    const qacc = leastSolution(J, [...bias.map((value) => -value), ...none, ...acceleration]);
+    model.opt.disableflags = this.flags | this.unconstrained;
+    data.qacc.set(qacc);
+    mj.mj_inverse(model, data);
+    const tau = Array.from(data.qfrc_inverse, (force, dof) => {
+      const loss = this.frictionless ? 0 : model.dof_frictionloss[dof], v = data.qvel[dof];
+      return force + (Math.abs(v) < AT_REST ? 0 : loss * Math.sign(v));
+    });
+    const transposed = tau.map((_, dof) => J.map((row) => row[dof]));
+    const forces = leastSolution(transposed, tau).slice(J.length - this.drives.length);
+    return {forces: Array.from(forces), gap};
+  }
+}
+
+// A tetrahedron as STL, in the place of meshes that are not there: they show bodies whose inertia is
+// stated.
+function tetrahedron() {
+  const corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], bytes = Buffer.alloc(84 + 4 * 50);
+  bytes.writeUInt32LE(4, 80);
+  [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]].forEach((face, f) => face.forEach((corner, v) => corners[corner].forEach((x, i) =>
+    bytes.writeFloatLE(x, 84 + 50 * f + 12 * (v + 1) + 4 * i))));
+  return bytes;
+}
+
+/** Compiles a file with what lies in its folder. */
+function compileFile({mj}, file) {
+  const folder = path.dirname(file), vfs = new mj.MjVFS();
+  // Contacts may be of bodies of a scene that is another file.
+  const text = fs.readFileSync(file, 'utf8').replace(/<contact>[^]*?<\/contact>/g, '');
+  const below = /meshdir\s*=\s*["']([^"']*)/.exec(text)?.[1] ?? /assetdir\s*=\s*["']([^"']*)/.exec(text)?.[1] ?? '';
+  for (const [, name] of text.matchAll(/<mesh[^>]*\sfile\s*=\s*["']([^"']*\.stl)["']/gi)) {
+    const place = path.join(below, name);
+    if (!fs.existsSync(path.join(folder, place))) vfs.addBuffer(place, tetrahedron());
+  }
+  for (const name of fs.readdirSync(folder, {recursive: true})) {
+    const whole = path.join(folder, name);
+    if (fs.statSync(whole).isFile() && /\.(xml|stl|obj|msh|skn|png)$/i.test(name)) vfs.addBuffer(name, fs.readFileSync(whole));
+  }
+  const spec = mj.parseXMLString(text, vfs);
+  return mj.mj_compile(spec, vfs);
+}
+
+/** Rows of a trace file: {t, column → numbers}. */
+function readTraces(file) {
+  const [head, ...lines] = fs.readFileSync(file, 'utf8').trim().split('\n').map((line) => line.split(','));
+  return Object.fromEntries(head.map((name, c) => [name, lines.map((line) => Number(line[c]))]));
+}
+
+function checkFile(engine, program, file, scratch) {
+  const run = (...words) => execFileSync(program, words, {encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'], maxBuffer: 1 << 28});
+  const row = {file, notes: []};
+  const out = fs.mkdtempSync(path.join(scratch, 'run'));
+  try {
+    run('run', file, '--out', out, '--no-own-file', '-q');
+  } catch (error) {
+    if (error.status !== 1) return {...row, refused: 'mbverify does not run it'};
+  }
+  const find = (name) => fs.readdirSync(out, {recursive: true}).map((one) => path.join(out, one)).find((one) => path.basename(one) === name);
+  const setup = find('model.yaml');
+  if (!setup || !find('traces.csv')) return {...row, refused: 'mbverify makes no motion of it'};
+  const mechanism = JSON.parse(run('model', setup, '--format', 'mechanism'));
+  row.notes = [...fs.readFileSync(setup, 'utf8').matchAll(/^ {2}- "?(.*? is left out.*?)"?$/gm)].map((match) => match[1]);
+  const robot = new Robot(engine, compileFile(engine, file), mechanism);
+  Object.assign(row, robot.compareBodies());
+  robot.goHome();
+  row.poses = robot.comparePoses();
+  const trace = readTraces(find('traces.csv')), last = trace.time_s.length - 1;
+  const column = (drive, quantity) => trace[`${drive.name}.${quantity}.reference`];
+  const at = (quantity, i) => robot.drives.map((drive) => column(drive, quantity)[i]);
+  const size = Math.max(...robot.drives.map((drive) => Math.max(...column(drive, 'force').map(Math.abs))));
+  const apart = (i) => {
+    const {forces, gap} = robot.driveForces(at('position', i), at('velocity', i), at('acceleration', i));
+    row.gap = Math.max(row.gap ?? 0, gap);
+    return Math.max(...minus(forces, at('force', i)).map(Math.abs)) / size;
+  };
+  row.gravity = apart(0);
+  row.moving = 0;
+  for (let k = 1; k <= STATES; k++) row.moving = Math.max(row.moving, apart(Math.round((k * last) / STATES)));
+  return {...row, bodies: mechanism.bodies.length - 1, drives: robot.drives.length, closures: mechanism.joints.filter((joint) => joint.closure).length};
+}
+
+/** Whether all that was compared is within its limit. */
+export const isWithin = (row) => [row.mass[0], row.centre[0], row.inertia[0], row.poses[0], row.gravity].every((x) => x <= COMPILED) && row.moving <= MOVING;
+
+const small = (x) => (x === 0 ? '0' : x.toExponential(1).replace('e', 'e'));
+function line(row, root) {
+  const file = path.relative(root, row.file);
+  if (row.refused) return `| ${file} | | | | | | | | | ${row.refused} |`;
+  const where = ([value, at]) => small(value) + (value > COMPILED ? ` (${at})` : '');
+  return `| ${file} | ${row.bodies} | ${row.closures} | ${row.drives} | ${where(row.mass)} | ${where(row.centre)} | ${where(row.inertia)} | ${where(row.poses)} | ${small(row.gravity)} | ${small(row.moving)} | ${row.notes.join('; ')} |`;
+}
+
+async function main([program, ...folders]) {
+  let engine;
+  try {
+    engine = await load(program);
+  } catch (error) {
+    if (!(error instanceof Refused)) throw error;
+    console.error(error.message);
+    return 77;
+  }
+  const scratch = fs.mkdtempSync(path.join(os.tmpdir(), 'robots_newest'));
+  let worst = 0;
+  console.log(`MuJoCo ${engine.version}\n`);
+  console.log('| file | bodies | loops | drives | mass | centre | inertia | poses | gravity | moving | left out, or why not |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|');
+  for (const folder of folders) {
+    const files = fs.statSync(folder).isFile() ? [folder] : fs.readdirSync(folder, {recursive: true}).filter((name) => name.endsWith('.xml')).sort().map((name) => path.join(folder, name));
+    for (const file of files) {
+      let row;
+      try {
+        row = checkFile(engine, program, path.resolve(file), scratch);
+      } catch (error) {
+        row = {file, refused: messageOf(engine, error).split('\n')[0].slice(0, 160), notes: []};
+      }
+      if (!row.refused && !isWithin(row) && row.notes.length === 0) worst = 1;
+      console.log(line(row, fs.statSync(folder).isFile() ? path.dirname(folder) : folder));
+    }
+  }
+  fs.rmSync(scratch, {recursive: true});
+  return worst;
+}
+
+if (import.meta.url === pathToFileURL(process.argv[1]).href) process.exitCode = await main(process.argv.slice(2));
