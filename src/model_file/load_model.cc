@@ -793,6 +793,8 @@ LoadResult LoadFrom(const std::string& text, Reading reading) {
     }
     mechanism = Assembled(reading.yaml.file(), &*sections);
     Check(*sections, &reading, &*mechanism);
+    AddMotorsOfJoints(sections->urdf.motors, &*mechanism);
+    result.motors_of_joints = std::move(sections->urdf.motors);
   }
   result.diagnostics = FindingsOf(reading);
   result.literals = reading.literals.Take();
@@ -802,6 +804,19 @@ LoadResult LoadFrom(const std::string& text, Reading reading) {
 }
 
 }  // namespace
+
+void AddMotorsOfJoints(const std::map<std::string, Motor>& motors, Mechanism* mechanism) {
+  for (size_t d = 0; d < mechanism->drives.size(); ++d) {
+    const auto drive = static_cast<int>(d);
+    const auto* on = std::get_if<JointDrive>(&mechanism->drives[d].kind);
+    if (on == nullptr || std::ranges::count(mechanism->motors, drive, &Motor::drive) > 0) continue;
+    const Joint& joint = mechanism->joints[static_cast<size_t>(on->joint)];
+    const auto motor = motors.find(joint.name);
+    if (motor == motors.end() || DofsOf(joint.kind) != 1) continue;
+    mechanism->motors.push_back(motor->second);
+    mechanism->motors.back().drive = drive;
+  }
+}
 
 bool IsRobotFile(const std::string& file) {
   return std::ranges::any_of(std::array{".urdf", ".xml", ".sdf", ".xacro"},

@@ -60,7 +60,13 @@ struct LoadResult {
   Diagnostics diagnostics;             ///< all findings, warnings included
   std::vector<Literal> literals;       ///< in the order of reading, each place once
   std::vector<ModelCaveat> caveats;    ///< what every verdict on it names
+  /// Limits that a URDF file states of what may move a joint, by the joint's name; those of drives
+  /// are motors of the mechanism.
+  std::map<std::string, Motor> motors_of_joints = {};
 };
+
+/// Gives every drive on a joint of one coordinate that has no motor the one of its joint.
+void AddMotorsOfJoints(const std::map<std::string, Motor>& motors, Mechanism* mechanism);
 
 /// Loads `file` (model.yaml or .urdf), evaluates expressions, builds the joint graph and spanning
 /// tree, solves the home pose and checks that all loops close. Never throws for bad input.

@@ -287,6 +287,7 @@ UrdfSection UrdfReader::Read(const Block& model, const YamlNode& node, const Int
   UrdfSection urdf = Add(*source, into.bodies, into.joints);
   urdf.left_out = source->tree.left_out;
   urdf.gravity_W = source->tree.gravity_W;
+  urdf.motors = source->tree.motors;
   ReadGuesses(model, map, into.joints);
   AddMimics(source->tree, node, into);
   AddDynamics(source->tree, into);

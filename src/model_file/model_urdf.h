@@ -22,7 +22,8 @@ struct UrdfSection {
   int root = -1;                          ///< body that needs a joint to the world; -1: none
   std::map<std::string, Finding> joints;  ///< where each joint is described, closures included
   std::vector<ModelCaveat> left_out;
-  std::optional<Vec3> gravity_W;  ///< where the file states it
+  std::optional<Vec3> gravity_W;        ///< where the file states it
+  std::map<std::string, Motor> motors;  ///< limits of what may move a joint, by its name
 };
 
 /// Reads the links of a URDF file as bodies, its joints and closures, its motors as drives,

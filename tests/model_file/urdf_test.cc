@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -158,6 +159,38 @@ std::string Extended(const std::string& in_joint, const std::string& more) {
          "<joint name=\"j\" type=\"continuous\"><parent link=\"base\"/><child link=\"arm\"/>"
          "<axis xyz=\"0 1 0\"/>" +
          in_joint + "</joint>" + more + "</robot>";
+}
+
+// What is not positive or very large says nothing.
+TEST(UrdfImport, LimitsOfEffortAndVelocityAreMotors) {
+  const double none = Motor::kNoLimit;
+  struct Case {
+    std::string limit;
+    double peak, speed;
+  };
+  for (const Case& c : {Case{"effort=\"12\" velocity=\"3.5\"", 12, 3.5},
+                        Case{"effort=\"0\" velocity=\"3.5\"", none, 3.5},
+                        Case{"effort=\"12\" velocity=\"1e30\"", 12, none},
+                        Case{"effort=\"0\" velocity=\"0\"", none, none}}) {
+    for (const bool driven : {false, true}) {
+      const test::TestFolder folder("urdf_limits");
+      const LoadResult loaded = LoadModel(folder.Write(
+          "r.urdf",
+          Extended("<limit " + c.limit + "/>",
+                   driven ? "<transmission name=\"t\"><joint name=\"j\"/></transmission>" : "")));
+      ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+      const bool any = std::isfinite(c.peak) || std::isfinite(c.speed);
+      ASSERT_EQ(loaded.motors_of_joints.size(), any ? 1u : 0u) << c.limit;
+      ASSERT_EQ(loaded.mechanism->motors.size(), any && driven ? 1u : 0u) << c.limit;
+      if (!any) continue;
+      const Motor& motor = loaded.motors_of_joints.at("j");
+      EXPECT_EQ(motor.peak, c.peak);
+      EXPECT_EQ(motor.max_speed, c.speed);
+      EXPECT_TRUE(motor.turns);
+      if (!driven) continue;
+      EXPECT_EQ(loaded.mechanism->motors[0].drive, 0);
+    }
+  }
 }
 
 // Each row in a file in which it acts, and in one with a value that does nothing.

@@ -444,6 +444,16 @@ Mechanism WithDriveForEachDof(const Mechanism& mechanism, std::vector<std::strin
         added.size(), added.size() == 1 ? "" : "s", added.size() == 1 ? "is" : "are",
         Joined(added, kMostNames)));
   }
+  // Motors stay with their drives.
+  std::vector<Motor> motors;
+  for (Motor& motor : m.motors) {
+    const std::string& name = m.drives[static_cast<size_t>(motor.drive)].name;
+    const auto kept = std::ranges::find(drives, name, &Drive::name);
+    if (kept == drives.end()) continue;
+    motor.drive = static_cast<int>(kept - drives.begin());
+    motors.push_back(std::move(motor));
+  }
+  m.motors = std::move(motors);
   m.drives = std::move(drives);
   return m;
 }
@@ -472,6 +482,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
     setup.notes.push_back(caveats[0].text);
   }
   caveats.insert(caveats.end(), loaded.caveats.begin(), loaded.caveats.end());
+  AddMotorsOfJoints(loaded.motors_of_joints, &m);
   setup.by_forces = static_cast<int>(by_forces.size());
   if (setup.by_forces > 0) AddOutputs(&m);
   AddBases(&m);

@@ -415,6 +415,7 @@ class Importer {
       joint.axis = axis.normalized();
     }
     ReadLimits(from, &joint);
+    if (from.limits && DofsOf(joint.kind) == 1) ReadMotor(from, joint.kind);
     if (from.dynamics) ReadDynamics(from, joint.kind, line);
     if (from.mimic) {
       tree_.mimics.push_back(
@@ -436,6 +437,18 @@ class Importer {
     take(from.dynamics->damping, &dynamics.damping, &damped_);
     take(from.dynamics->friction, &dynamics.friction, &friction_);
     if (dynamics.damping > 0.0 || dynamics.friction > 0.0) tree_.dynamics.push_back(dynamics);
+  }
+
+  // Zero is written where nothing is known, as are very large numbers.
+  void ReadMotor(const urdf::Joint& from, JointKind kind) {
+    Motor motor;
+    motor.turns = !IsLength(kind, 0);
+    for (const auto& [limit, into] :
+         {std::pair(from.limits->effort, &motor.peak), {from.limits->velocity, &motor.max_speed}}) {
+      if (limit > 0.0 && limit < kUrdfNoLimit) *into = limit;
+    }
+    if (std::isinf(motor.peak) && std::isinf(motor.max_speed)) return;
+    tree_.motors[from.name] = std::move(motor);
   }
 
   void ReadLimits(const urdf::Joint& from, Joint* joint) {

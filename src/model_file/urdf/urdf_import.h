@@ -60,6 +60,7 @@ struct UrdfTree {
     double damping = 0.0, friction = 0.0;
   };
   std::vector<Dynamics> dynamics;
+  std::map<std::string, Motor> motors;  ///< <limit>'s effort and velocity, by joint; positive ones
   /// Of joints with one coordinate, as simulators add it: a rotor's inertia [kg m²] and ratio, a
   /// spring's stiffness [N/m or N m/rad] and free position.
   struct Extra {
