@@ -246,13 +246,7 @@ class Grafter {
       if (IsTag(e, "key") && e->Attribute("qpos") != nullptr) keys.push_back(e);
     });
     if (keys.empty()) return;
-    int unnamed = 0;
-    ForEach(root(), [&](XMLElement* e) {
-      if ((IsTag(e, "joint") || IsTag(e, "freejoint")) && HasName(e) &&
-          e->Attribute("name") == nullptr) {
-        e->SetAttribute("name", fmt::format("joint{}", unnamed++).c_str());
-      }
-    });
+    NameJoints();
     XMLDocument flat;
     model_.DeepCopy(&flat);
     if (!DissolveFrames(&flat).text.empty()) return;  // reported for the model itself
@@ -282,6 +276,37 @@ class Grafter {
         next += static_cast<std::ptrdiff_t>(size);
       }
       keys_.push_back(std::move(taken));
+    }
+  }
+
+  // Names that nothing in either document has, with or without the numbers of replicas behind them:
+  // these follow a '_', so that joint1_ and its replicas are none of joint10_.
+  void NameJoints() {
+    std::vector<XMLElement*> unnamed;
+    std::vector<std::string> taken;
+    ForEach(root(), [&](XMLElement* e) {
+      if ((!IsTag(e, "joint") && !IsTag(e, "freejoint")) || !HasName(e)) return;
+      if (e->Attribute("name") == nullptr) {
+        unnamed.push_back(e);
+      } else {
+        taken.push_back(prefix_ + e->Attribute("name"));
+      }
+    });
+    ForEach(into_.RootElement(), [&](XMLElement* e) {
+      const bool joint = IsTag(e, "joint") || IsTag(e, "freejoint");
+      if (joint && e->Attribute("name") != nullptr) taken.emplace_back(e->Attribute("name"));
+    });
+    int next = 0;
+    for (XMLElement* e : unnamed) {
+      std::string name;
+      const auto clashes = [&](const std::string& other) {
+        return other.starts_with(prefix_ + name) || (prefix_ + name).starts_with(other);
+      };
+      do {
+        name = fmt::format("joint{}_", next++);
+      } while (std::ranges::any_of(taken, clashes));
+      taken.push_back(prefix_ + name);
+      e->SetAttribute("name", name.c_str());
     }
   }
 
