@@ -402,6 +402,12 @@ class Checker {
                       spring.stiffness, spring.damping),
           "has no springs and dampers");
     }
+    for (const Body& body : mechanism_.bodies) {
+      if (body.gravity_compensation == 0.0) continue;
+      Add(fmt::format("gravity compensation {:.6g} of body {}", body.gravity_compensation,
+                      body.name),
+          "has bodies whose whole weight acts");
+    }
     for (const Coupling& coupling : mechanism_.couplings) {
       Add("coupling " + coupling.name, "has no couplings");
     }

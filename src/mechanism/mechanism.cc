@@ -164,6 +164,11 @@ std::string FirstFriction(const Mechanism& mechanism) {
   return "";
 }
 
+bool HasGravityCompensation(const Mechanism& mechanism) {
+  return std::ranges::any_of(mechanism.bodies,
+                             [](const Body& body) { return body.gravity_compensation != 0.0; });
+}
+
 std::string Described(const Mechanism& mechanism, const ForceElement& element) {
   const std::string word = IsGyroscopic(element) ? "gyroscopic rotor" : WordOf(element);
   if (element.bushing >= 0) {

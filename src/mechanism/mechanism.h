@@ -147,6 +147,9 @@ struct Body {
   double mass = 0.0;              ///< [kg], >= 0; 0 is a massless connecting piece
   Vec3 p_BoBcm_B = Vec3::Zero();  ///< centre of mass [m]
   Mat3 I_Bcm_B = Mat3::Zero();    ///< about the centre of mass, body axes [kg m²]
+  /// Share of the weight that a force at the centre of mass carries, whoever exerts it; it counts
+  /// as a load. Beyond 1 it lifts, below 0 it pulls down.
+  double gravity_compensation = 0.0;
   std::vector<NamedFrame> frames;
   std::vector<Shape> shapes;
 };
@@ -220,6 +223,10 @@ struct Drive {
   double radius = 0.0;  ///< for pictures [m]; 0: chosen by the renderer
   /// Of the servo that holds the drive [N/m or N m/rad]; infinite: locked. Stiffness only.
   double stiffness = std::numeric_limits<double>::infinity();
+  /// Its force contains what the gravity compensation of the bodies beyond its joint
+  /// (BodiesBeyond()) does along the joint's axis: the drive exerts it. Revolute and prismatic tree
+  /// joints only.
+  bool compensates_gravity = false;
   /// What stands behind the letter of a quantity in figures, markup (plot/figure.h): "_{1}".
   std::string symbol = {};
 };
@@ -409,6 +416,9 @@ struct SignalSheet {
   std::string positive;  ///< what a positive value means
   std::string unit;
 };
+
+/// True if a force carries a share of some body's weight.
+[[nodiscard]] bool HasGravityCompensation(const Mechanism& mechanism);
 
 /// Unit of a drive's position ("m" or "rad") and of its force ("N" or "N m").
 [[nodiscard]] std::string PositionUnit(const Mechanism& mechanism, const Drive& drive);

@@ -34,6 +34,10 @@ SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& h
 /// True when one of these or a force element uses a coordinate of this joint.
 [[nodiscard]] bool HasUsedCoordinate(const Mechanism& mechanism, int joint);
 
+/// Bodies that tree joints join with a joint's child, where the joint and all bodies' joints with
+/// the world are cut: what a tree joint carries, wherever the world holds the tree.
+[[nodiscard]] std::vector<int> BodiesBeyond(const Mechanism& mechanism, int joint);
+
 /// Body on the world's side of the t-th tree joint, and the one that this joint carries.
 [[nodiscard]] inline int InboardBody(const Mechanism& mechanism, size_t t) {
   const Joint& joint = mechanism.joints[mechanism.tree_joints[t]];

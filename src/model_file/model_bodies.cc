@@ -74,8 +74,9 @@ void BodyReader::ReadBody(const Block& block, const YamlEntry& entry) {
     yaml.Error(entry, fmt::format("{}: a body '{}' is there already", path, body.name));
     return;
   }
-  const YamlMap map(&yaml, entry.value.get(), path,
-                    {"mass", "com", "com_mm", "inertia", "frames", "shapes", "beams"});
+  const YamlMap map(
+      &yaml, entry.value.get(), path,
+      {"mass", "com", "com_mm", "inertia", "gravity_compensation", "frames", "shapes", "beams"});
   ReadMass(block, map, &body);
   const int index = static_cast<int>(bodies_.bodies.size());
   bodies_.places.push_back({.place = PlaceOf(entry),
@@ -97,6 +98,8 @@ void BodyReader::ReadMass(const Block& block, const YamlMap& map, Body* body) {
       body->mass = kNan;
     }
   }
+  body->gravity_compensation =
+      values_.Number(block, map, "gravity_compensation", {kPlain}).value_or(0.0);
   body->p_BoBcm_B = values_.Vector(block, map, "com", {kPlain, kMm}).value_or(Vec3::Zero());
   const YamlNode* inertia = map.Find("inertia");
   if (inertia == nullptr) return;

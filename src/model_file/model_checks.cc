@@ -179,7 +179,21 @@ void CheckMasses(const Mechanism& mechanism, Impossible impossible, ModelReport*
 bool CheckTree(const ClosureHints& hints, Mechanism* mechanism, ModelReport* report) {
   const SpanningTreeResult tree = BuildSpanningTree(mechanism, hints);
   ReportTree(*mechanism, tree, report);
-  return tree.ok();
+  if (!tree.ok()) return false;
+  bool good = true;
+  for (const Drive& drive : mechanism->drives) {
+    if (!drive.compensates_gravity) continue;
+    const Joint& joint =
+        mechanism->joints[static_cast<size_t>(std::get<JointDrive>(drive.kind).joint)];
+    if (!joint.closure) continue;
+    good = false;
+    report->At(report->places().signals.Of(drive.name), Severity::kError,
+               fmt::format("drive '{}' carries gravity compensation, but joint '{}' closes a loop: "
+                           "no body is beyond it",
+                           drive.name, joint.name),
+               "closure: true at another joint of the loop");
+  }
+  return good;
 }
 
 void CheckAxes(const Mechanism& mechanism, bool closed_at_home, ModelReport* report) {

@@ -26,10 +26,11 @@ void DriveReader::ReadDrive(const Block& block, const YamlEntry& entry) {
   const bool joint_drive = kind_node != nullptr && kind_node->text == "joint";
   const YamlMap map(
       &yaml, entry.value.get(), path,
-      joint_drive ? std::vector<std::string>{"kind", "joint", "coordinate", "range", "range_deg",
-                                             "range_mm", "stiffness", "compliance"}
-                  : std::vector<std::string>{"kind", "from", "to", "range", "range_mm", "radius",
-                                             "radius_mm", "stiffness", "compliance"});
+      joint_drive
+          ? std::vector<std::string>{"kind", "joint", "coordinate", "range", "range_deg",
+                                     "range_mm", "stiffness", "compliance", "gravity_compensation"}
+          : std::vector<std::string>{"kind", "from", "to", "range", "range_mm", "radius",
+                                     "radius_mm", "stiffness", "compliance"});
   if (!map.valid() || map.Required("kind") == nullptr) return;
   if (!yaml.Choice(*kind_node, map.PathOf("kind"), {"joint", "distance"})) return;
   Drive drive;
@@ -43,6 +44,7 @@ void DriveReader::ReadDrive(const Block& block, const YamlEntry& entry) {
   }
   ReadRange(block, map, &drive);
   drive.stiffness = ReadStiffness(block, map);
+  if (joint_drive) ReadCompensation(map, &drive);
   places_.Add(drive.name, "drive", PlaceOf(entry));
   drives_.push_back(std::move(drive));
 }
@@ -70,6 +72,23 @@ void DriveReader::ReadRange(const Block& block, const YamlMap& map, Drive* drive
   }
   drive->range = values_.Range(block, *range.node, map.PathOf(range.key), range.unit)
                      .value_or(CoordinateRange{});
+}
+
+// What the drive exerts of it is a force along one fixed axis.
+void DriveReader::ReadCompensation(const YamlMap& map, Drive* drive) {
+  const YamlNode* node = map.Find("gravity_compensation");
+  if (node == nullptr) return;
+  const std::string path = map.PathOf("gravity_compensation");
+  const auto exerts = values_.yaml().Flag(*node, path);
+  if (!exerts || !*exerts) return;
+  const Joint& joint = joints_.joints[static_cast<size_t>(std::get<JointDrive>(drive->kind).joint)];
+  drive->compensates_gravity =
+      joint.kind == JointKind::kRevolute || joint.kind == JointKind::kPrismatic;
+  if (drive->compensates_gravity) return;
+  values_.yaml().Error(
+      *node, fmt::format("{}: joint '{}' is {}, a drive that carries gravity compensation "
+                         "needs a revolute or prismatic one",
+                         path, joint.name, RowOf(joint.kind).word));
 }
 
 // Of the servo [N/m or N m/rad]; infinite (locked) when neither key is given.

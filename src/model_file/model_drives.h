@@ -27,6 +27,7 @@ class DriveReader {
   bool ReadDistanceDrive(const Block& block, const YamlMap& map, Drive* drive);
   void ReadRange(const Block& block, const YamlMap& map, Drive* drive);
   double ReadStiffness(const Block& block, const YamlMap& map);
+  void ReadCompensation(const YamlMap& map, Drive* drive);
 
   ModelValues& values_;
   const BodyNames& names_;

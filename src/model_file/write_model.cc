@@ -173,6 +173,9 @@ class ModelWriter {
           "    com: {}\n    inertia: {{xx: {}, yy: {}, zz: {}, xy: {}, xz: {}, yz: {}}}\n",
           Triple(body.p_BoBcm_B), I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2));
     }
+    if (body.gravity_compensation != 0.0) {
+      text += fmt::format("    gravity_compensation: {}\n", body.gravity_compensation);
+    }
     return text + FramesAndShapes(static_cast<int>(b), "    ");
   }
 
@@ -235,6 +238,7 @@ class ModelWriter {
       }
       if (HasBound(drive.range)) text += ", range: " + RangePair(drive.range);
       if (std::isfinite(drive.stiffness)) text += fmt::format(", stiffness: {}", drive.stiffness);
+      if (drive.compensates_gravity) text += ", gravity_compensation: true";
       text += "}\n";
     }
     std::string symbols;

@@ -114,9 +114,9 @@ int FillReactions(const Mechanism& mechanism, const BodyStates& states, const Ro
 [[nodiscard]] ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,
                                   const BodyStates& states);
 
-/// Wrench [m about Bo; f] that each body needs beyond gravity, springs, force elements and loads,
-/// in world axes: m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
-/// `friction_signs`: FrictionDirections().
+/// Wrench [m about Bo; f] that each body needs beyond gravity and its compensation, springs, force
+/// elements and loads, in world axes: m a_cm and I ε + ω × I ω about the centre of mass, moved to
+/// the origin. `friction_signs`: FrictionDirections().
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
                       const std::vector<LoadSample>& loads, const std::vector<int>& friction_signs,
                       std::vector<Vec6>* wrench_W);

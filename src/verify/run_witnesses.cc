@@ -59,6 +59,13 @@ class ForeignRunner {
         return "loads that are expressions of the state are not handed to foreign witnesses";
       }
     }
+    for (const Drive& drive : mechanism_.drives) {
+      if (!drive.compensates_gravity) continue;
+      return fmt::format(
+          "drive '{}' exerts gravity compensation, which is not handed to foreign "
+          "witnesses",
+          drive.name);
+    }
     return "";
   }
 
@@ -86,8 +93,21 @@ class ForeignRunner {
       if (!there.ok()) return "there is no drive motion: " + there.message;
       EvaluateMotion(motion_, t_s, &sample);
       handed->loads.push_back(sample.loads);
+      AddCompensation(&handed->loads.back());
     }
     return "";
+  }
+
+  // To them it is a load at the centre of mass, like others.
+  void AddCompensation(std::vector<LoadSample>* loads) const {
+    for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
+      const Body& body = mechanism_.bodies[b];
+      const double carried = body.gravity_compensation * body.mass;
+      if (carried == 0.0) continue;
+      loads->push_back({.body = static_cast<int>(b),
+                        .p_BoQ_B = body.p_BoBcm_B,
+                        .force = -carried * mechanism_.gravity_W});
+    }
   }
 
   // What moves by forces: where it starts, and which forces drives push with.

@@ -438,6 +438,17 @@ TEST(SdfImport, LimitsThatLeaveNothingHold) {
   EXPECT_THAT(read.text, HasSubstr("joint 'j' is held at 0.2"));
 }
 
+TEST(SdfImport, LinksWithoutGravityAreCompensated) {
+  for (const auto& [text, share] :
+       {std::pair("", 0.0), {"<gravity>true</gravity>", 0.0}, {"<gravity>false</gravity>", 1.0}}) {
+    const Read read = ReadText(ArmText({.arm = text}));
+    ASSERT_TRUE(read.mechanism) << read.text;
+    const int arm = read.mechanism->FindBody("arm");
+    ASSERT_GT(arm, 0);
+    EXPECT_EQ(read.mechanism->bodies[static_cast<size_t>(arm)].gravity_compensation, share);
+  }
+}
+
 TEST(SdfImport, WorldsHaveGravityAndWhatIsStaticBelongsToThem) {
   std::string arm = ArmText();
   arm = arm.substr(arm.find("<model"), arm.find("</sdf>") - arm.find("<model"));
@@ -541,7 +552,6 @@ std::map<std::string, Sample> Samples() {
       {"plugin",
        {of_model("<plugin name='p' filename='libunheard.so'/>"),
         of_model("<plugin name='p' filename='libgazebo_ros_imu.so'/>")}},
-      {"link/gravity text", {of_arm("<gravity>false</gravity>"), of_arm("<gravity>1</gravity>")}},
       {"link/enable_wind text",
        {of_arm("<enable_wind>1</enable_wind>"), of_arm("<enable_wind>false</enable_wind>")}},
       {"link/kinematic text",
@@ -770,7 +780,7 @@ TEST(SdfImport, ShapesAreForPictures) {
 TEST(SdfImport, TheSourceGoesToTheReaderAsItIs) {
   Diagnostics diagnostics;
   const auto source =
-      InspectSdf(ArmText({.arm = "<gravity>0</gravity>"}), "robot.sdf", &diagnostics);
+      InspectSdf(ArmText({.arm = "<enable_wind>1</enable_wind>"}), "robot.sdf", &diagnostics);
   ASSERT_TRUE(source) << diagnostics.Text();
   const auto back = FromBytes<SdfSource>(ToBytes(*source));
   ASSERT_TRUE(back);

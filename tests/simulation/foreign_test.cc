@@ -110,7 +110,6 @@ std::map<std::string, Sample> Samples() {
       {"option viscosity", {option("viscosity='1e-3'"), option("viscosity='0'")}},
       {"option wind", {option("density='1.2' wind='1 0 0'"), option("wind='1 0 0'")}},
       {"asset/mesh inertia", {of_mesh("inertia='shell'"), of_mesh("inertia='legacy'")}},
-      {"body gravcomp", {Arm({.arm = "gravcomp='1'"}), Arm({.arm = "gravcomp='0.0'"})}},
       {"ball stiffness", {ball("stiffness='3'"), ball("stiffness='0'")}},
       {"ball damping", {ball("damping='3'"), ball("damping='0'")}},
       {"ball frictionloss", {ball("frictionloss='3'"), ball("frictionloss='0'")}},
@@ -364,11 +363,42 @@ TEST(ForeignMjcf, FlagsThatSwitchForcesOffAreTaken) {
   EXPECT_TRUE(std::isinf(read("limit='disable'").model->mechanism.joints[0].range[0].upper));
 }
 
+// MuJoCo 3 takes it from the body, and whether an actuator exerts it from the joint or its class.
+TEST(ForeignMjcf, GravityCompensationIsTakenWithTheDrivesThatExertIt) {
+  const auto drive_of = [](const std::string& joint) {
+    return Arm({.head = "<default><default class='c'><joint actuatorgravcomp='true'/></default>"
+                        "</default><size nuser_body='3'/>",
+                .arm = "gravcomp='0.75' user='1 2 3'",
+                .joint = joint,
+                .in_world = "<body name='float' pos='3 0 0' gravcomp='-0.5'><joint/><inertial "
+                            "pos='0 0 0' mass='1' diaginertia='1 1 1'/></body>",
+                .tail = "<actuator><motor name='a' joint='A'/><motor name='b' joint='B'/>"
+                        "</actuator>"});
+  };
+  for (const auto& [joint, exerts] : {std::pair("", false),
+                                      {"class='c'", true},
+                                      {"actuatorgravcomp='true'", true},
+                                      {"class='c' actuatorgravcomp='false'", false}}) {
+    const Read read = ReadText(drive_of(joint));
+    ASSERT_TRUE(read.model) << read.diagnostics.Text();
+    const Mechanism& m = read.model->mechanism;
+    EXPECT_EQ(m.bodies[static_cast<size_t>(m.FindBody("upper"))].gravity_compensation, 0.75);
+    EXPECT_EQ(m.bodies[static_cast<size_t>(m.FindBody("lower"))].gravity_compensation, 0.0);
+    EXPECT_EQ(m.bodies[static_cast<size_t>(m.FindBody("float"))].gravity_compensation, -0.5);
+    EXPECT_EQ(m.drives[0].compensates_gravity, exerts) << joint;
+    EXPECT_FALSE(m.drives[1].compensates_gravity);
+    EXPECT_TRUE(Sources(read).empty());
+  }
+}
+
+// Not where passive forces are off, nor where no body's is positive.
 TEST(ForeignMjcf, GravityCompensationOfNothingIsNone) {
-  for (const char* off : {"<option gravity='0 0 0'/>", "<option><flag gravity='disable'/></option>",
-                          "<option><flag passive='disable'/></option>"}) {
-    const Read read = ReadText(Arm({.head = off, .arm = "gravcomp='1'"}));
-    EXPECT_TRUE(Sources(read).empty()) << off << read.diagnostics.Text();
+  const Parts off{.head = "<option><flag passive='disable'/></option>", .arm = "gravcomp='1'"};
+  for (const Parts& parts : {off, Parts{.arm = "gravcomp='-1'"}, Parts{.arm = "gravcomp='0'"}}) {
+    const Read read = ReadText(Arm(parts));
+    ASSERT_TRUE(read.model) << read.diagnostics.Text();
+    EXPECT_FALSE(HasGravityCompensation(read.model->mechanism));
+    EXPECT_TRUE(Sources(read).empty()) << read.diagnostics.Text();
   }
 }
 
@@ -489,6 +519,82 @@ std::string WithHand(const std::string& attach) {
 <frame pos="0 0 0.4" euler="0.5 0 0">)" +
          attach + R"(</frame></body></worldbody>
 <actuator><motor name="a" joint="A"/><motor name="t" joint="l_yaw"/></actuator></mujoco>)";
+}
+
+// Joints without names get some for their keyframes, which nothing in either file has.
+TEST(ForeignMjcf, JointsOfAttachedModelsGetNamesThatAreFree) {
+  const test::TestFolder folder("attach_names");
+  const std::string inertial = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>";
+  std::string bodies, numbers;
+  for (int k = 0; k < 12; ++k) {
+    bodies += fmt::format("<body name='b{}'><joint{}/>{}</body>", k,
+                          k == 3 ? " name='joint1_'" : "", inertial);
+    numbers += fmt::format(" {}", 0.01 * k);
+  }
+  folder.Write("hand.xml", fmt::format("<mujoco model='hand'><worldbody><body name='palm'>{}{}"
+                                       "</body></worldbody><keyframe><key name='k' qpos='{}'/>"
+                                       "</keyframe></mujoco>",
+                                       inertial, bodies, numbers));
+  const std::string arm = fmt::format(
+      "<mujoco><compiler angle='radian'/><asset><model file='hand.xml'/></asset><worldbody><body "
+      "name='arm'><joint name='joint2_7'/>{}<attach model='hand' body='palm' prefix=''/></body>"
+      "</worldbody></mujoco>",
+      inertial);
+  Diagnostics said;
+  const auto model = ReadMjcf(arm, folder.Write("arm.xml", arm), "", &said);
+  ASSERT_TRUE(model) << said.Text();
+  const Mechanism& m = model->mechanism;
+  for (int k = 0; k < 12; ++k) {
+    const int body = m.FindBody(fmt::format("b{}", k));
+    const auto joint = std::ranges::find(m.joints, body, &Joint::child);
+    ASSERT_NE(joint, m.joints.end());
+    EXPECT_NEAR(joint->home[0], 0.01 * k, 1e-12) << joint->name;
+  }
+}
+
+// F = g f: limits of an actuator are those of a motor behind its gear, on either side.
+TEST(ForeignMjcf, LimitsOfActuatorsAreMotors) {
+  struct Case {
+    std::string actuator, joint;
+    double n, peak;  // no peak: no motor
+  };
+  const double none = Motor::kNoLimit;
+  for (const Case& c : std::vector<Case>{
+           {"<motor joint='A' gear='5' ctrllimited='true' ctrlrange='-2 2'/>", "", 5, 2},
+           {"<motor joint='A' gear='-5' ctrlrange='-2 2'/>", "", 5, 2},
+           {"<motor joint='A' gear='5' ctrllimited='false' ctrlrange='-2 2'/>", "", 5, none},
+           {"<motor joint='A' ctrllimited='true' ctrlrange='-2 1'/>", "", 1, 1},
+           {"<motor joint='A' ctrlrange='-2 2' forcerange='-1.5 1.5'/>", "", 1, 1.5},
+           {"<general joint='A' gainprm='30' gear='2' ctrlrange='-2 2'/>", "", 2, 60},
+           {"<general joint='A' gainprm='30' biastype='affine' biasprm='0 -30 0' ctrlrange='-2 2' "
+            "forcerange='-7 7'/>",
+            "", 1, 7},
+           {"<position joint='A' kp='100' ctrlrange='-2 2'/>", "", 1, none},
+           {"<position joint='A' kp='100' ctrlrange='-2 2' forcerange='-40 40'/>", "", 1, 40},
+           {"<velocity joint='A' kv='10' forcerange='-4 4'/><position joint='A' kp='100' gear='3' "
+            "forcerange='-2 2'/>",
+            "", 1, 10},
+           {"<motor joint='A' gear='5' ctrlrange='-2 2'/>", "actuatorfrcrange='-6 6'", 5, 1.2},
+           {"<motor joint='A' gear='5'/>", "actuatorfrcrange='-6 6'", 5, 1.2},
+           {"<motor joint='A'/>", "actuatorfrcrange='-6 6' actuatorfrclimited='false'", 1, none},
+           {"<motor joint='A'/>", "class='c'", 1, 8},
+           {"<motor joint='A'/>", "", 1, none}}) {
+    const Read read = ReadText(
+        Arm({.head = "<default><default class='c'><joint actuatorfrcrange='-8 8'/></default>"
+                     "</default>",
+             .joint = c.joint,
+             .tail = "<actuator>" + c.actuator + "</actuator>"}));
+    ASSERT_TRUE(read.model) << c.actuator << read.diagnostics.Text();
+    const Mechanism& m = read.model->mechanism;
+    ASSERT_EQ(m.drives.size(), 1u);
+    const bool motor = std::isfinite(c.peak) || c.n != 1.0;
+    ASSERT_EQ(m.motors.size(), motor ? 1u : 0u) << c.actuator << c.joint;
+    if (!motor) continue;
+    EXPECT_NEAR(m.motors[0].gear_ratio, c.n, 1e-15) << c.actuator;
+    EXPECT_TRUE(m.motors[0].peak == c.peak || std::abs(m.motors[0].peak - c.peak) < 1e-12)
+        << c.actuator;
+    EXPECT_TRUE(m.motors[0].turns);
+  }
 }
 
 // What is attached is what MuJoCo 3 makes of it, here written by hand.

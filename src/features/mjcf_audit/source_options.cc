@@ -81,6 +81,8 @@ class OwnStepper {
   void LeadByActuators(const OwnDrive& drive, double position, double velocity);
   void FindRows();
   [[nodiscard]] RunSummary Start();
+  void Compensate();
+  [[nodiscard]] double CompensationAt(int dof) const;
   [[nodiscard]] RunSummary Trouble(double t_s) const;
   void Record(long sample, double t_s);
   void RecordGaps(double t_s);
@@ -703,7 +705,28 @@ RunSummary OwnStepper::Start() {
   mj_resetData(m_, d_.get());
   Eigen::Map<VecX>(d_->qpos, m_->nq) = own_.home;
   std::fill_n(d_->qvel, m_->nv, 0.0);
+  Compensate();
   return RunSummary::Done();
+}
+
+// MuJoCo 2.2 does not know gravcomp: as a force that stays (xfrc_applied).
+void OwnStepper::Compensate() {
+  if (!HasGravityCompensation(*task_.mechanism) || m_->nuser_body == 0) return;
+  const auto which = static_cast<int>(mjcf::UserNumber::kGravityCompensation);
+  for (int b = 1; b < m_->nbody; ++b) {
+    const double carried = m_->body_user[m_->nuser_body * b + which] * m_->body_mass[b];
+    for (int i = 0; i < 3; ++i) d_->xfrc_applied[6 * b + i] = -carried * m_->opt.gravity[i];
+  }
+}
+
+// What that does along a DOF, where the drive exerts it.
+double OwnStepper::CompensationAt(int dof) const {
+  std::vector<mjtNum> along(static_cast<size_t>(m_->nv), 0.0);
+  const mjtNum none[3] = {};
+  for (int b = 1; b < m_->nbody; ++b) {
+    mj_applyFT(m_, d_.get(), d_->xfrc_applied + 6 * b, none, d_->xipos + 3 * b, b, along.data());
+  }
+  return along[static_cast<size_t>(dof)];
 }
 
 void OwnStepper::Note(const std::string& what, double t_s) {
@@ -829,6 +852,7 @@ void OwnStepper::RecordForces(long sample) {
     if (e >= 0 && row_[static_cast<size_t>(e)] >= 0) {
       force = d_->efc_force[row_[static_cast<size_t>(e)]];
     }
+    if (task_.mechanism->drives[k].compensates_gravity) force += CompensationAt(drive.dof);
     run_->trace.values(sample, column++) = force;
     const double q = d_->qpos[drive.qpos] - drive.zero;
     run_->tracking[k] =

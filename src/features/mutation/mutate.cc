@@ -607,6 +607,10 @@ std::string DescribeChange(const Mechanism& base, const Mechanism& perturbed) {
   add("the inertia of", Which(base.bodies, perturbed.bodies, [](const Body& a, const Body& b) {
         return Same(a.mass, b.mass) && !SameMoments(a, b);
       }));
+  add("the gravity compensation of",
+      Which(base.bodies, perturbed.bodies, [](const Body& a, const Body& b) {
+        return !Same(a.gravity_compensation, b.gravity_compensation);
+      }));
   add("joint frames or axes of",
       Which(base.joints, perturbed.joints, [](const Joint& a, const Joint& b) {
         return !Same(a.X_PF, b.X_PF) || !Same(a.X_CM, b.X_CM) || !Same(a.axis, b.axis) ||

@@ -76,7 +76,7 @@ const SdfRow kRows[] = {
     {"plugin", "", kLeftOut, "it may do anything to forces", "", true},
 
     {"model/link", "name", kTaken},
-    {"link/gravity", "text", kLeftOut, "the link has no weight", "true|1"},
+    {"link/gravity", "text", kTaken},
     {"link/enable_wind", "text", kLeftOut, kWind, "false|0"},
     {"link/kinematic", "text", kLeftOut, "no force moves the link", "false|0"},
     {"link/self_collide", "text", kNoForce},
@@ -134,7 +134,7 @@ const SdfRow kRows[] = {
     {"limit/lower", "text", kTaken},
     {"limit/upper", "text", kTaken},
     {"limit/effort", "text", kTaken},
-    {"limit/velocity", "text", kNoForce},
+    {"limit/velocity", "text", kTaken},
     {"limit/stiffness", "text", kNoForce},
     {"limit/dissipation", "text", kNoForce},
     {"axis/mimic", "joint axis text", kTaken},

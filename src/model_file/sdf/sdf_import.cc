@@ -223,6 +223,9 @@ class SdfImporter {
     I << number(inertia, "ixx", 1.0), ixy, ixz, ixy, number(inertia, "iyy", 1.0), iyz, ixz, iyz,
         number(inertia, "izz", 1.0);
     body.mass = number(inertial, "mass", 1.0);
+    if (element != nullptr && element->HasElement("gravity") && !element->Get<bool>("gravity")) {
+      body.gravity_compensation = 1.0;
+    }
     body.p_BoBcm_B = X_BI.translation();
     body.I_Bcm_B = X_BI.linear() * I * X_BI.linear().transpose();
     body.I_Bcm_B = 0.5 * (body.I_Bcm_B + body.I_Bcm_B.transpose()).eval();
@@ -447,7 +450,8 @@ class SdfImporter {
            .law = RotorLaw{.inertia = inertia, .ratio = std::isnan(ratio) ? 1.0 : ratio}});
     }
     if (dofs - first == 1 && joint.kind != JointKind::kFixed) {
-      scalars_.push_back({index, first, from.Name(), from.Axis(0)->Effort()});
+      scalars_.push_back(
+          {index, first, from.Name(), from.Axis(0)->Effort(), from.Axis(0)->MaxVelocity()});
     }
     index_[of.scope + from.Name()] = index;
     m_.joints.push_back(std::move(joint));
@@ -686,6 +690,15 @@ class SdfImporter {
       m_.drives.push_back({.name = joint.name,
                            .kind = JointDrive{scalar.joint, scalar.coordinate},
                            .range = joint.range[static_cast<size_t>(scalar.coordinate)]});
+      Motor motor;
+      motor.drive = static_cast<int>(m_.drives.size()) - 1;
+      motor.turns = !IsLength(joint.kind, scalar.coordinate);
+      for (const auto& [limit, into] :
+           {std::pair(scalar.effort, &motor.peak), {scalar.velocity, &motor.max_speed}}) {
+        if (limit > 0.0 && limit < kNoSdfLimit) *into = limit;
+      }
+      if (std::isinf(motor.peak) && std::isinf(motor.max_speed)) continue;
+      m_.motors.push_back(std::move(motor));
     }
   }
 
@@ -709,7 +722,7 @@ class SdfImporter {
   struct Scalar {
     int joint = 0, coordinate = 0;
     std::string name;
-    double effort = 0.0;
+    double effort = 0.0, velocity = 0.0;  ///< limits; without one negative or infinite
   };
 
   const SdfSource& source_;

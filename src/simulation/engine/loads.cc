@@ -6,6 +6,7 @@
 
 #include "math/spatial.h"
 #include "mechanism/followed_state.h"
+#include "mechanism/spanning_tree.h"
 #include "simulation/engine/recorder.h"
 
 namespace mbv::simulation {
@@ -176,11 +177,61 @@ void Loads::Evaluate(double t_s, const mjData& d) {
     out.force = X_WB.linear() * out.force;
     out.moment = X_WB.linear() * out.moment;
   }
+  if (compensates_) AddCompensation(d);
+}
+
+Loads::Loads(const EngineModel& engine, const Motion& motion)
+    : engine_(engine),
+      motion_(motion),
+      following_(engine, motion),
+      compensates_(HasGravityCompensation(*engine.mechanism)) {
+  const Mechanism& mechanism = *engine.mechanism;
+  for (size_t d = 0; d < mechanism.drives.size() && compensates_; ++d) {
+    if (!mechanism.drives[d].compensates_gravity) continue;
+    const int joint = std::get<JointDrive>(mechanism.drives[d].kind).joint;
+    const auto at = std::ranges::find(mechanism.tree_joints, joint);
+    const bool reversed =
+        mechanism.tree_reversed[static_cast<size_t>(at - mechanism.tree_joints.begin())];
+    exerted_by_drives_.push_back({.joint_id = engine.driven[d].object,
+                                  .sign = reversed ? -1.0 : 1.0,
+                                  .beyond = BodiesBeyond(mechanism, joint)});
+    joint_forces_.push_back({.driven = d, .dof = engine.driven[d].dof});
+  }
+}
+
+// MuJoCo has it since 3.0 as gravcomp; here it acts as loads on bodies. What a drive exerts of it
+// is taken away along the joint's axis, which points against the mechanism's where the joint is
+// reversed.
+void Loads::AddCompensation(const mjData& d) {
+  const Mechanism& mechanism = *engine_.mechanism;
+  const Vec3 g(engine_.m->opt.gravity);
+  std::vector<WorldLoad> of(mechanism.bodies.size());
+  for (size_t b = 1; b < of.size(); ++b) {
+    const Body& body = mechanism.bodies[b];
+    const double carried = body.gravity_compensation * body.mass;
+    if (carried == 0.0) continue;
+    of[b].body_id = engine_.body_id[static_cast<size_t>(engine_.PlannedOf(static_cast<int>(b)))];
+    of[b].p_WQ = Vec3(d.xipos + 3 * of[b].body_id);
+    of[b].force = -carried * g;
+    world_.push_back(of[b]);
+  }
+  for (size_t k = 0; k < exerted_by_drives_.size(); ++k) {
+    const ExertedByDrive& drive = exerted_by_drives_[k];
+    const Vec3 axis(d.xaxis + 3 * drive.joint_id), anchor(d.xanchor + 3 * drive.joint_id);
+    const bool slides = engine_.m->jnt_type[drive.joint_id] == mjJNT_SLIDE;
+    double sum = 0.0;
+    for (const int b : drive.beyond) {
+      const WorldLoad& load = of[static_cast<size_t>(b)];
+      sum += axis.dot(slides ? load.force : Vec3((load.p_WQ - anchor).cross(load.force)));
+    }
+    joint_forces_[k].force = -drive.sign * sum;
+  }
 }
 
 bool Loads::follow() const {
-  return std::ranges::any_of(motion_.loads,
-                             [](const Load& load) { return !load.following.empty(); });
+  return compensates_ || std::ranges::any_of(motion_.loads, [](const Load& load) {
+           return !load.following.empty();
+         });
 }
 
 void Loads::AddGeneralized(mjData* d, double* qfrc) const {
@@ -188,6 +239,7 @@ void Loads::AddGeneralized(mjData* d, double* qfrc) const {
     mj_applyFT(engine_.m.get(), d, load.force.data(), load.moment.data(), load.p_WQ.data(),
                load.body_id, qfrc);
   }
+  for (const JointForce& force : joint_forces_) qfrc[force.dof] += force.force;
 }
 
 }  // namespace mbv::simulation

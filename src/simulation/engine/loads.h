@@ -1,4 +1,4 @@
-// External wrenches and spring-dampers as MuJoCo sees them.
+// External wrenches and gravity compensation as MuJoCo sees them.
 #pragma once
 
 #include <vector>
@@ -47,29 +47,49 @@ struct WorldLoad {
   Vec3 force = Vec3::Zero(), moment = Vec3::Zero();  ///< [N], [N m]
 };
 
+/// What acts along a driven joint's coordinate against the gravity compensation that its drive
+/// exerts: the drive's own force contains the opposite.
+struct JointForce {
+  size_t driven = 0;  ///< EngineModel::driven
+  int dof = 0;
+  double force = 0.0;  ///< [N or N m]
+};
+
 /// A load on a body that MuJoCo does not have (merged) is not supported.
 [[nodiscard]] RunSummary CheckLoads(const EngineModel& engine, const Motion& motion);
 
-/// Evaluates the motion's loads at t for the data's current poses.
+/// Evaluates the motion's loads, and gravity compensation as further ones, at t for the data's
+/// current poses.
 class Loads {
  public:
-  Loads(const EngineModel& engine, const Motion& motion)
-      : engine_(engine), motion_(motion), following_(engine, motion) {}
+  Loads(const EngineModel& engine, const Motion& motion);
 
   void Evaluate(double t_s, const mjData& d);
-  /// True if some load follows the state: then Evaluate() needs tendons and mj_comVel.
+  /// True if some load follows the state: then Evaluate() needs the data's position, tendons and
+  /// mj_comVel.
   [[nodiscard]] bool follow() const;
   /// The first load that was not finite; then nothing evaluated since is.
   [[nodiscard]] const RunSummary& trouble() const { return following_.trouble(); }
   [[nodiscard]] const std::vector<WorldLoad>& world() const { return world_; }
+  [[nodiscard]] const std::vector<JointForce>& joint_forces() const { return joint_forces_; }
   /// Adds Jᵀ(load) of the loads last evaluated to `qfrc` (nv).
   void AddGeneralized(mjData* d, double* qfrc) const;
 
  private:
+  struct ExertedByDrive {
+    int joint_id = 0;         ///< MuJoCo's
+    double sign = 1.0;        ///< of the mechanism's axis along MuJoCo's
+    std::vector<int> beyond;  ///< BodiesBeyond()
+  };
+  void AddCompensation(const mjData& d);
+
   const EngineModel& engine_;
   const Motion& motion_;
   FollowingLoads following_;
+  const bool compensates_;
+  std::vector<ExertedByDrive> exerted_by_drives_;
   std::vector<WorldLoad> world_;
+  std::vector<JointForce> joint_forces_;  ///< per exerted_by_drives_
 };
 
 }  // namespace mbv::simulation

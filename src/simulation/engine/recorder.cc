@@ -48,6 +48,9 @@ void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates) 
     (*rates)[driven] +=
         load.moment.dot(w) + load.force.dot(VelocityOf(m, d, load.body_id, load.p_WQ));
   }
+  for (const JointForce& force : loads.joint_forces()) {
+    (*rates)[driven] += force.force * d.qvel[force.dof];
+  }
   for (size_t s = 0; s < engine.spring_tendon.size(); ++s) {
     const double rate = SpringRate(system, s);
     (*rates)[driven + 1] -= engine.mechanism->springs[s].damping * rate * rate;
@@ -512,6 +515,10 @@ void Recorder::TreeWrenches(const Loads& loads) {
   for (const WorldLoad& load : loads.world()) {
     AddExternal(load.body_id, load.p_WQ, load.force, load.moment);
   }
+  beside_drives_.setZero(static_cast<Eigen::Index>(engine_.driven.size()));
+  for (const JointForce& force : loads.joint_forces()) {
+    beside_drives_[static_cast<Eigen::Index>(force.driven)] = force.force;
+  }
   // What a body needs beyond the forces on it and its subtree comes from its parent.
   for (int b = m.nbody - 1; b > 0; --b) {
     if (m.body_parentid[b] > 0) W_.col(m.body_parentid[b]) += W_.col(b);
@@ -551,7 +558,9 @@ void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
     }
     F_W->segment<3>(slide ? 3 : 0) -= sign * force * axis;
   };
-  for (const auto& [row, id] : driven_of_[joint]) exclude(id, system_->DrivenForce(row));
+  for (const auto& [row, id] : driven_of_[joint]) {
+    exclude(id, system_->DrivenForce(row) + beside_drives_[row]);
+  }
   for (const auto& [row, id] : coupled_of_[joint]) {
     exclude(id, system_->J().coeff(row, engine_.m->jnt_dofadr[id]) * system_->force()[row]);
   }

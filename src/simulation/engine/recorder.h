@@ -150,6 +150,7 @@ class Recorder {
   std::vector<std::array<int, 2>> universal_;     // per joint: MuJoCo's hinges of a universal one
   Eigen::Matrix<double, 6, Eigen::Dynamic> W_;  // per MuJoCo body: wrench from its parent about the
                                                 // root's centre of mass, world axes
+  VecX beside_drives_;                          // per driven coordinate: Loads::joint_forces()
   VecX work_;
   Powers power_;
 };

@@ -245,7 +245,6 @@ void AddDrive(int u, MjcfImport* in) {
   const int tendon = m.actuator_trntype[u] == mjTRN_TENDON ? m.actuator_trnid[2 * u] : -1;
   if (const auto leg = tendon >= 0 ? LegOf(tendon, *in) : std::nullopt) {
     if (!in->driven_tendons.insert(tendon).second) return;
-    if (m.actuator_gear[6 * u] != 1.0) in->geared.push_back(name);
     Drive drive{.name = name, .kind = *leg, .range = {}};
     if (m.tendon_limited[tendon] != 0 && !in->LimitsAreOff()) {
       drive.range = {m.tendon_range[2 * tendon], m.tendon_range[2 * tendon + 1]};
@@ -275,7 +274,6 @@ void AddDrive(int u, MjcfImport* in) {
     return on != nullptr && on->joint == j;
   });
   if (second) return;
-  if (m.actuator_gear[6 * u] != 1.0) in->geared.push_back(name);
   drives.push_back({.name = name,
                     .kind = JointDrive{j, 0},
                     .range = in->mechanism.joints[static_cast<size_t>(j)].range[0]});
@@ -285,6 +283,114 @@ void AddDrive(int u, MjcfImport* in) {
 
 void AddDrives(MjcfImport* in) {
   for (int u = 0; u < in->m.nu; ++u) AddDrive(u, in);
+}
+
+// Motors of an MJCF file: what its actuators can give at most.
+//
+//   F = Σ_u g_u f_u along the joint or tendon, g the gear, f the actuator's force (1) f = k c of a
+//   motor (a gain k, no bias), c its control                                        (2)
+//
+// f is limited by forcerange, c by ctrlrange, and F by the joint's actuatorfrcrange. A position or
+// velocity servo pushes as its error asks: only forcerange limits it. One actuator is the motor
+// behind a gear n = |g|; several are one on the joint.
+
+namespace {
+
+constexpr double kUnlimited = Motor::kNoLimit;
+
+// Limits of motors hold in both directions.
+double Magnitude(const mjtNum* range) { return std::min(std::abs(range[0]), std::abs(range[1])); }
+
+struct ActuatorLimit {
+  double force = kUnlimited;  ///< of one actuator
+  bool lopsided = false;      ///< one direction is limited more
+};
+
+ActuatorLimit LimitOf(const mjModel& m, int u) {
+  ActuatorLimit limit;
+  const auto take = [&](const mjtNum* range, double scale) {
+    if (scale * Magnitude(range) >= limit.force) return;
+    limit = {.force = scale * Magnitude(range),
+             .lopsided = std::abs(range[0]) != std::abs(range[1])};
+  };
+  if (m.actuator_forcelimited[u] != 0) take(m.actuator_forcerange + 2 * u, 1.0);
+  const mjtNum* bias = m.actuator_biasprm + mjNBIAS * u;
+  const bool no_bias =
+      m.actuator_biastype[u] == mjBIAS_NONE || (m.actuator_biastype[u] == mjBIAS_AFFINE &&
+                                                bias[0] == 0.0 && bias[1] == 0.0 && bias[2] == 0.0);
+  const bool direct = m.actuator_dyntype[u] == mjDYN_NONE || m.actuator_dyntype[u] == mjDYN_FILTER;
+  if (no_bias && direct && m.actuator_gaintype[u] == mjGAIN_FIXED &&
+      m.actuator_ctrllimited[u] != 0) {
+    take(m.actuator_ctrlrange + 2 * u, std::abs(m.actuator_gainprm[mjNGAIN * u]));
+  }
+  return limit;
+}
+
+// What moves a drive.
+struct Movers {
+  std::vector<int> actuators;
+  int joint = -1;  ///< MuJoCo's
+};
+
+Movers MoversOf(const Drive& drive, const MjcfImport& in) {
+  const mjModel& m = in.m;
+  Movers movers;
+  const auto* on = std::get_if<JointDrive>(&drive.kind);
+  int tendon = -1;
+  for (int u = 0; u < m.nu && on == nullptr; ++u) {
+    if (in.NameOf(mjOBJ_ACTUATOR, u, "actuator") == drive.name) tendon = m.actuator_trnid[2 * u];
+  }
+  for (int u = 0; u < m.nu; ++u) {
+    const int type = m.actuator_trntype[u], target = m.actuator_trnid[2 * u];
+    if (on == nullptr) {
+      if (type == mjTRN_TENDON && target == tendon) movers.actuators.push_back(u);
+    } else if ((type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT) &&
+               in.joint_of[static_cast<size_t>(target)] == on->joint) {
+      movers.actuators.push_back(u);
+      movers.joint = target;
+    }
+  }
+  return movers;
+}
+
+void AddMotor(size_t d, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const Drive& drive = in->mechanism.drives[d];
+  const Movers movers = MoversOf(drive, *in);
+  const auto gear = [&](int u) { return std::abs(m.actuator_gear[6 * u]); };
+  double most = 0.0;  // along the drive
+  bool lopsided = false;
+  for (const int u : movers.actuators) {
+    const ActuatorLimit limit = LimitOf(m, u);
+    if (gear(u) != 0.0) most += gear(u) * limit.force;
+    lopsided = lopsided || limit.lopsided;
+  }
+  if (movers.joint >= 0 && in->JointNumber(movers.joint, mjcf::UserNumber::kForceLimited) != 0.0) {
+    const double ends[] = {in->JointNumber(movers.joint, mjcf::UserNumber::kForceLower),
+                           in->JointNumber(movers.joint, mjcf::UserNumber::kForceUpper)};
+    if (Magnitude(ends) < most) {
+      most = Magnitude(ends);
+      lopsided = std::abs(ends[0]) != std::abs(ends[1]);
+    }
+  }
+  const bool alone = movers.actuators.size() == 1 && gear(movers.actuators[0]) != 0.0;
+  const double n = alone ? gear(movers.actuators[0]) : 1.0;
+  if (lopsided) in->lopsided.push_back(drive.name);
+  if (!(most > 0.0) || (std::isinf(most) && n == 1.0)) return;
+  const auto* on = std::get_if<JointDrive>(&drive.kind);
+  Motor motor;
+  motor.drive = static_cast<int>(d);
+  motor.turns = on != nullptr &&
+                in->mechanism.joints[static_cast<size_t>(on->joint)].kind == JointKind::kRevolute;
+  motor.peak = most / n;
+  motor.gear_ratio = n;
+  in->mechanism.motors.push_back(std::move(motor));
+}
+
+}  // namespace
+
+void AddMotors(MjcfImport* in) {
+  for (size_t d = 0; d < in->mechanism.drives.size(); ++d) AddMotor(d, in);
 }
 
 // Force elements of an MJCF file.
@@ -336,6 +442,26 @@ void AddElements(MjcfImport* in) {
   for (int t = 0; t < in->m.ntendon; ++t) AddSpring(t, in);
   for (int j = 0; j < in->m.njnt; ++j) {
     if (IsScalar(in->m, j)) AddElementsOf(j, in);
+  }
+}
+
+// MuJoCo 3 computes it if some body's is positive, and as long as it computes passive forces at
+// all. A joint's actuator exerts the joint's part of it whatever else acts there.
+void AddCompensation(MjcfImport* in) {
+  const mjModel& m = in->m;
+  const auto of = [in](int b) { return in->BodyNumber(b, mjcf::UserNumber::kGravityCompensation); };
+  bool acts = false;
+  for (int b = 1; b < m.nbody; ++b) acts = acts || of(b) > 0.0;
+  if (!acts || in->IsOff(mjDSBL_PASSIVE)) return;
+  for (int b = 1; b < m.nbody; ++b) in->BodyOf(b).gravity_compensation = of(b);
+  for (int j = 0; j < m.njnt; ++j) {
+    const bool exerted = in->JointNumber(j, mjcf::UserNumber::kExertedByActuator) != 0.0;
+    if (!exerted || !IsScalar(m, j)) continue;
+    for (Drive& drive : in->mechanism.drives) {
+      const auto* on = std::get_if<JointDrive>(&drive.kind);
+      if (on == nullptr || on->joint != in->joint_of[static_cast<size_t>(j)]) continue;
+      drive.compensates_gravity = true;
+    }
   }
 }
 
@@ -621,8 +747,9 @@ void WarnWhatIsLost(MjcfImport* in) {
                         Joined(in->carried, kMost) + (in->carried.size() == 1 ? " is" : " are"),
                         in->carried.size() == 1 ? "a free joint" : "free joints"));
   }
-  WarnNames(*in, "the gears of these actuators are left out: ", in->geared,
-            "positions and forces are those of the joint, not of the motor");
+  WarnNames(*in,
+            "actuators of these drives push harder to one side, their motors' limit is the less: ",
+            in->lopsided);
   WarnNames(*in, "positions of these joints count from the file's reference (ref): ", in->shifted);
   WarnNames(*in, "zero is beyond the range of these joints, the loops are closed from inside it: ",
             in->moved);

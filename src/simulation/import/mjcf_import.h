@@ -52,7 +52,7 @@ struct MjcfImport {
   int held_inside = -1;
 
   // What the findings at the end report.
-  std::vector<std::string> held = {}, carried = {}, floating = {}, geared = {}, shifted = {},
+  std::vector<std::string> held = {}, carried = {}, floating = {}, lopsided = {}, shifted = {},
                            moved = {};
   std::vector<std::string> driving = {};  ///< joints whose damping is negative
   std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
@@ -82,6 +82,13 @@ struct MjcfImport {
   [[nodiscard]] bool ContactsAreOff() const {
     return IsOff(mjDSBL_CONTACT) || IsOff(mjDSBL_CONSTRAINT);
   }
+  /// Of a body or joint; 0 without one.
+  [[nodiscard]] double BodyNumber(int b, mjcf::UserNumber which) const {
+    return m.nuser_body == 0 ? 0.0 : m.body_user[m.nuser_body * b + static_cast<int>(which)];
+  }
+  [[nodiscard]] double JointNumber(int j, mjcf::UserNumber which) const {
+    return m.nuser_jnt == 0 ? 0.0 : m.jnt_user[m.nuser_jnt * j + static_cast<int>(which)];
+  }
   [[nodiscard]] std::string NameOf(mjtObj type, int id, const char* kind) const {
     return NameAt(m, type, id, kind);
   }
@@ -101,10 +108,14 @@ void ChooseHeld(MjcfImport* in);
 void AddTree(MjcfImport* in);
 /// Actuators on hinges, slides and tendons between two sites.
 void AddDrives(MjcfImport* in);
+/// Motors of the drives, where the file limits what actuators give.
+void AddMotors(MjcfImport* in);
 /// Closures, and couplings of joints.
 void AddEqualities(MjcfImport* in);
 /// Armature, damping, dry friction and springs of hinges and slides.
 void AddElements(MjcfImport* in);
+/// Gravity compensation of bodies, and the drives that exert their part of it.
+void AddCompensation(MjcfImport* in);
 /// Sites as frames, geoms and mesh files as shapes.
 void AddSites(MjcfImport* in);
 void AddShapes(MjcfImport* in);

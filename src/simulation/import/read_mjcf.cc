@@ -43,8 +43,10 @@ ImportedMjcf Import(mjcf::ForeignMjcf* source, const std::string& file, const Fl
   ChooseHeld(&in);
   AddTree(&in);
   AddDrives(&in);
+  AddMotors(&in);
   AddEqualities(&in);
   AddElements(&in);
+  AddCompensation(&in);
   AddSites(&in);
   AddShapes(&in);
   WarnWhatIsLost(&in);

@@ -68,7 +68,6 @@ struct ForeignMjcf::Impl {
   std::map<std::string, SitePair> by_sites;
   std::map<std::string, ForeignMesh> meshes;
   std::vector<ModelCaveat> left_out;
-  bool weightless = false;  // gravity compensation does nothing
   bool good = false;
 
   void Add(Severity severity, int line, const std::string& text, const std::string& hint = "") {
@@ -356,6 +355,60 @@ struct ForeignMjcf::Impl {
         "<compiler autolimits=\"false\"/> if they should not");
   }
 
+  // What MuJoCo 3 says of bodies and joints and 2.2 has no word for goes through its compiler as
+  // the numbers that users may give them (UserNumber).
+  void CarryThrough() {
+    bool any = false;
+    ForEach(root(), [&](XMLElement* e) {
+      for (const char* of : {"gravcomp", "actuatorgravcomp", "actuatorfrcrange"}) {
+        any = any || e->Attribute(of) != nullptr;
+      }
+    });
+    if (!any) return;
+    std::vector<XMLElement*> joints;
+    ForEach(root(), [&](XMLElement* e) {
+      if (IsTag(e, "body")) {
+        e->DeleteAttribute("user");
+        if (e->Attribute("gravcomp") != nullptr) {
+          e->SetAttribute("user", e->Attribute("gravcomp"));
+          e->DeleteAttribute("gravcomp");
+        }
+      }
+      if (IsTag(e, "joint") && ElementOf(e) == "body/joint") joints.push_back(e);
+    });
+    std::vector<std::string> numbers;
+    for (const XMLElement* e : joints) numbers.push_back(JointNumbers(e));
+    for (size_t j = 0; j < joints.size(); ++j) {
+      for (const char* of : {"actuatorgravcomp", "actuatorfrclimited", "actuatorfrcrange"}) {
+        joints[j]->DeleteAttribute(of);
+      }
+      joints[j]->DeleteAttribute("user");
+      const bool stands = IsTag(joints[j]->Parent()->ToElement(), "body");
+      if (stands) joints[j]->SetAttribute("user", numbers[j].c_str());
+    }
+    for (XMLElement* size = root()->FirstChildElement("size"); size != nullptr;
+         size = size->NextSiblingElement("size")) {
+      size->DeleteAttribute("nuser_body");
+      size->DeleteAttribute("nuser_jnt");
+    }
+    XMLElement* size = document.NewElement("size");
+    size->SetAttribute("nuser_body", 1);
+    size->SetAttribute("nuser_jnt", 4);
+    root()->InsertEndChild(size);
+  }
+
+  // In the order of UserNumber.
+  static std::string JointNumbers(const XMLElement* joint) {
+    const auto is = [joint](const char* attribute, std::string_view value) {
+      const char* text = Inherited(joint, attribute);
+      return text != nullptr && text == value;
+    };
+    const char* range = Inherited(joint, "actuatorfrcrange");
+    const bool limited = range != nullptr && !is("actuatorfrclimited", "false");
+    return fmt::format("{} {} {}", is("actuatorgravcomp", "true") ? 1 : 0, limited ? 1 : 0,
+                       limited ? range : "0 0");
+  }
+
   // The body that carries a site, by its name, which it is given if it has none; empty without one.
   std::string BodyOfSite(const std::string& site) {
     XMLElement* body = nullptr;
@@ -416,25 +469,15 @@ struct ForeignMjcf::Impl {
 
   // Since MuJoCo 3.3.6 springs and dampers are switched off apart.
   void SwitchOff() {
-    bool springs = false, dampers = false, passive = false;
-    weightless = false;
+    bool springs = false, dampers = false;
     ForEach(root(), [&](XMLElement* e) {
-      if (IsTag(e, "option")) {
-        const char* gravity = e->Attribute("gravity");
-        if (gravity != nullptr && !MoreThanFirst(gravity) && std::atof(gravity) == 0.0) {
-          weightless = true;
-        }
-      }
       if (!IsTag(e, "flag")) return;
       springs = springs || IsOff(e, "spring");
       dampers = dampers || IsOff(e, "damper");
-      passive = passive || IsOff(e, "passive");
-      weightless = weightless || IsOff(e, "gravity");
       if (springs && dampers) e->SetAttribute("passive", "disable");
       e->DeleteAttribute("spring");
       e->DeleteAttribute("damper");
     });
-    weightless = weightless || passive || (springs && dampers);
     if (springs == dampers) return;
     const char* off = springs ? "stiffness" : "damping";
     ForEach(root(), [&](XMLElement* e) {
@@ -513,7 +556,6 @@ struct ForeignMjcf::Impl {
       if (row == nullptr) Note(e, element, a->Name(), unknown);
       if (row == nullptr || row->fate != Fate::kLeftOut || row->compiled) continue;
       if (IsNeutral(*row, a->Value())) continue;
-      if (weightless && std::string_view(a->Name()) == "gravcomp") continue;
       Note(e, element, a->Name(), lost);
     }
   }
@@ -592,6 +634,7 @@ ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnost
   if (ok()) impl_->WriteOutFrames();
   if (ok()) impl_->DropPictures();
   if (ok()) impl_->LookUpAll();  // what only serves pictures needs no word
+  if (ok()) impl_->CarryThrough();
   if (ok()) impl_->LetRangesHold();
   if (ok()) impl_->NameBodiesOfSites();
   if (ok()) impl_->MakeFoldersAbsolute();

@@ -14,6 +14,16 @@
 
 namespace mbv::mjcf {
 
+/// What MuJoCo 3 says of bodies and joints and 2.2 has no word for: places among the user numbers
+/// of the compiled model (body_user, jnt_user). Without user numbers the file says nothing of it.
+enum class UserNumber {
+  kGravityCompensation = 0,  ///< of bodies: gravcomp
+  kExertedByActuator = 0,    ///< of joints: actuatorgravcomp, 1 or 0
+  kForceLimited = 1,         ///< actuatorfrclimited, 1 or 0
+  kForceLower = 2,           ///< actuatorfrcrange
+  kForceUpper = 3,
+};
+
 /// The two sites that a closure makes coincide, the first one on body1.
 using SitePair = std::pair<std::string, std::string>;
 

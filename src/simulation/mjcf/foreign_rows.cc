@@ -82,17 +82,16 @@ const ForeignRow kRows[] = {
     {"mesh/plugin", "*", kNoForce},
 
     {"worldbody", "*", kTaken},
-    {"body", "name childclass pos quat axisangle xyaxes zaxis euler", kTaken},
+    {"body", "name childclass pos quat axisangle xyaxes zaxis euler gravcomp", kTaken},
     {"body", "mocap sleep simple user", kNoForce},
-    {"body", "gravcomp", kLeftOut, "a force carries a share of the body's weight", "0"},
     {"frame", "name childclass pos quat axisangle xyaxes zaxis euler", kTaken},
     {"replicate", "count offset euler sep childclass", kTaken},
     {"body/attach", "model body frame prefix", kTaken},
     {"body/inertial", "pos quat mass diaginertia axisangle xyaxes zaxis euler fullinertia", kTaken},
     {"body/joint", "name class type pos axis springdamper limited range margin stiffness ref "
-                   "springref armature damping frictionloss", kTaken},
-    {"body/joint", "group actuatorfrclimited actuatorfrcrange actuatorgravcomp solreflimit "
-                   "solimplimit solreffriction solimpfriction user", kNoForce},
+                   "springref armature damping frictionloss actuatorgravcomp actuatorfrclimited "
+                   "actuatorfrcrange", kTaken},
+    {"body/joint", "group solreflimit solimplimit solreffriction solimpfriction user", kNoForce},
     {"ball", "stiffness", kLeftOut, kOfBall, "0", true},
     {"ball", "damping", kLeftOut, kOfBall, "0", true},
     {"ball", "frictionloss", kLeftOut, kOfBall, "0", true},
@@ -194,14 +193,14 @@ const ForeignRow kRows[] = {
     {"fixed/joint", "joint coef", kTaken},
 
     // A drive is one, whatever its servo does: its motion is commanded, its force is the result.
-    {"actuator/*", "name class joint jointinparent", kTaken},
+    // What limits the force is a motor's limit, for sizing.
+    {"actuator/*", "name class joint jointinparent gear ctrllimited ctrlrange forcelimited "
+                   "forcerange kp gainprm gaintype biasprm biastype dyntype", kTaken},
     {"actuator/*", "damping armature", kLeftOut, "a damper or rotor acts on the driven joint", "0"},
     {"actuator/*", "tendon slidersite cranksite site refsite body", kLeftOut, kActuatorLost, "", true},
     {"actuator of a ball", "joint", kLeftOut, kActuatorLost, "", true},
-    {"actuator/*", "group nsample interp delay ctrllimited forcelimited actlimited ctrlrange "
-                   "forcerange actrange velrange ffrange posrange lengthrange gear cranklength user "
-                   "actdim input dyntype gaintype biastype dynprm gainprm biasprm actearly "
-                   "inheritrange kp kv ki dampratio timeconst imax slewmax area diameter bias "
+    {"actuator/*", "group nsample interp delay actlimited actrange velrange ffrange posrange "
+                   "lengthrange cranklength user actdim input dynprm actearly inheritrange kv ki dampratio timeconst imax slewmax area diameter bias "
                    "tausmooth range force scale lmin lmax vmax fpmax fvmax gain motorconst "
                    "resistance nominal saturation inductance cogging lugre controller thermal "
                    "plugin instance",

@@ -333,6 +333,11 @@ std::string LackingText(const Mechanism& mechanism) {
     names += fmt::format("   {}: {}\n", InComment(element.name),
                          InComment(Described(mechanism, element)));
   }
+  for (const Body& body : mechanism.bodies) {
+    if (body.gravity_compensation == 0.0) continue;
+    names += fmt::format("   {}: a force carries {} of its weight (gravcomp since MuJoCo 3)\n",
+                         InComment(body.name), NumberText(body.gravity_compensation));
+  }
   if (names.empty()) return "";
   return "Not in this file, as MuJoCo 2.2 has no word for them; qfrc_applied can stand for "
          "them:\n" +
