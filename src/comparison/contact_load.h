@@ -1,11 +1,11 @@
 // What the ground bears of each foot (Contact in mechanism/mechanism.h), and whether it can: ground
 // pushes and does not pull, friction is limited, and the pressure acts within the sole.
 //
-//   N = f_z                      normal force; the foot lifts where N < 0 (1)
-//   |(f_x, f_y)| / N             the coefficient of friction that holds the foot; it slips beyond μ
-//   (2) c = (−m_y, m_x) / N          centre of pressure; the foot tips where it leaves the outline
-//   (3) |m_z − c_x f_y + c_y f_x|/N  lever of the moment about the normal through c; beyond what is
-//                                stated as `torsion` the foot twists (4)
+//   N = f_z                        normal force; the foot lifts where N < 0                (1)
+//   |(f_x, f_y)| / N               the friction that holds the foot; it slips beyond μ    (2)
+//   c = (−m_y, m_x) / N            centre of pressure; the foot tips outside its outline  (3)
+//   |m_z − c_x f_y + c_y f_x| / N  lever of the moment about the normal through c; the
+//                                  foot twists beyond `torsion`                           (4)
 //
 // with force and moment of the ground on the foot in the contact's frame. Of all feet on one plane
 // together the sums of (1) to (3) follow from the motion alone, whatever the feet share.

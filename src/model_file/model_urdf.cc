@@ -276,8 +276,9 @@ void FoldFrameLinks(const std::set<std::string>& keep, const std::vector<std::st
 UrdfSection UrdfReader::Read(const Block& model, const YamlNode& node, const Into& into) {
   YamlReader& yaml = values_.yaml();
   const bool short_form = node.is_scalar();
-  const YamlMap map(&yaml, short_form ? nullptr : &node, "urdf",
-                    {"file", "closures", "constraints", "guess", "guess_deg"});
+  const YamlMap map(
+      &yaml, short_form ? nullptr : &node, "urdf",
+      {"file", "closures", "constraints", "guess", "guess_deg", "gravity_compensation"});
   const YamlNode* name = short_form ? &node : map.Required("file");
   into.joints->good = false;  // until the tree is read
   const auto source = name == nullptr ? std::nullopt : ReadSource(model, *name, map);
@@ -289,6 +290,7 @@ UrdfSection UrdfReader::Read(const Block& model, const YamlNode& node, const Int
   urdf.gravity_W = source->tree.gravity_W;
   urdf.motors = source->tree.motors;
   ReadGuesses(model, map, into.joints);
+  ReadCompensation(model, map, into.bodies);
   AddMimics(source->tree, node, into);
   AddDynamics(source->tree, into);
   AddExtras(source->tree, into);
@@ -396,6 +398,21 @@ void UrdfReader::ReadGuesses(const Block& model, const YamlMap& map, ModelJoints
     for (const Joint& joint : joints->joints) names.push_back(joint.name);
     yaml.Error(entry, fmt::format("{}: there is no such joint in the URDF file", path),
                DidYouMean(entry.key, names));
+  }
+}
+
+// As bodies of model files state it.
+void UrdfReader::ReadCompensation(const Block& model, const YamlMap& map, ModelBodies* bodies) {
+  const std::string key = "gravity_compensation";
+  const YamlNode* node = map.Find(key);
+  if (node == nullptr) return;
+  std::vector<std::string> names;
+  for (size_t b = 1; b < bodies->bodies.size(); ++b) names.push_back(bodies->bodies[b].name);
+  const YamlMap shares(&values_.yaml(), node, map.PathOf(key), names);
+  for (size_t b = 1; b < bodies->bodies.size(); ++b) {
+    Body& body = bodies->bodies[b];
+    body.gravity_compensation =
+        values_.Number(model, shares, body.name, {kPlain}).value_or(body.gravity_compensation);
   }
 }
 

@@ -60,6 +60,7 @@ class UrdfReader {
   UrdfSection Add(const Source& source, ModelBodies* bodies, ModelJoints* joints);
   void TakeLiterals(Body* body);
   void ReadGuesses(const Block& model, const YamlMap& map, ModelJoints* joints);
+  void ReadCompensation(const Block& model, const YamlMap& map, ModelBodies* bodies);
   std::vector<std::string> MotorsOf(const Source& source, const ModelJoints& joints) const;
   void AddMimics(const UrdfTree& tree, const YamlNode& at, const Into& into);
   void AddDynamics(const UrdfTree& tree, const Into& into);

@@ -529,6 +529,55 @@ joints: {pipe: {kind: revolute, parent: world, child: a.j, axis: [1, 2, 2], gues
   EXPECT_EQ(std::get<Ball>(after[4].geometry).radius, 0.009);
 }
 
+// What acts on the bodies of a URDF file, and the feet that they stand on.
+TEST(UrdfExport, GravityCompensationAndFeetAreInTheCompanion) {
+  std::ifstream file(SourcePath("/tests/mechanisms/biped.yaml"));
+  std::string text((std::istreambuf_iterator<char>(file)), {});
+  const auto put = [&](const std::string& before, const std::string& after) {
+    const size_t at = text.find(before);
+    ASSERT_NE(at, std::string::npos) << before;
+    text.replace(at, before.size(), after);
+  };
+  put("pelvis: {mass", "pelvis: {gravity_compensation: 0.25, mass");
+  put("shank: {mass", "shank: {gravity_compensation: 1.5, mass");
+  put("joint: knee}", "joint: knee, gravity_compensation: true}");
+  const LoadResult loaded = LoadModelText(text, "biped.yaml");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ExpectRoundTrip(m);
+  const LoadResult back =
+      LoadModel(WriteFile("biped.yaml", WriteUrdfCompanion(m, m.name + ".urdf")));
+  ASSERT_TRUE(back.mechanism) << back.diagnostics.Text();
+  const Mechanism& n = *back.mechanism;
+  for (const Body& body : m.bodies) {
+    const int b = n.FindBody(body.name);
+    ASSERT_GE(b, 0) << body.name;
+    EXPECT_EQ(n.bodies[b].gravity_compensation, body.gravity_compensation) << body.name;
+  }
+  ASSERT_EQ(n.drives.size(), m.drives.size());
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    EXPECT_EQ(n.drives[d].compensates_gravity, m.drives[d].compensates_gravity) << d;
+  }
+  ASSERT_EQ(n.contacts.size(), m.contacts.size());
+  for (size_t c = 0; c < m.contacts.size(); ++c) {
+    const Contact &before = m.contacts[c], &after = n.contacts[c];
+    EXPECT_EQ(after.kind, before.kind);
+    EXPECT_EQ(after.friction, before.friction);
+    EXPECT_EQ(after.outline, before.outline);
+    const auto place = [](const Mechanism& of, const Contact& contact) {
+      const Joint& joint = of.joints[static_cast<size_t>(contact.joint)];
+      return Pose(of.X_WB_home[static_cast<size_t>(joint.child)] * joint.X_CM);
+    };
+    EXPECT_TRUE(place(n, after).isApprox(place(m, before), kUrdfRoundoff));
+  }
+  // A link that is not there is named.
+  const LoadResult wrong =
+      LoadModel(WriteFile("wrong.yaml", "name: w\nurdf: {file: " + m.name +
+                                            ".urdf, gravity_compensation: {pelvs: 1}}\n"));
+  EXPECT_NE(wrong.diagnostics.Text().find("did you mean 'pelvis'"), std::string::npos)
+      << wrong.diagnostics.Text();
+}
+
 TEST(UrdfExport, TheCommentHoldsTheCompanion) {
   const LoadResult loaded = LoadModelText(kFourBar, "m.yaml");
   ASSERT_TRUE(loaded.mechanism);

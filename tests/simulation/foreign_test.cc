@@ -541,7 +541,7 @@ TEST(ForeignMjcf, JointsOfAttachedModelsGetNamesThatAreFree) {
       "</worldbody></mujoco>",
       inertial);
   Diagnostics said;
-  const auto model = ReadMjcf(arm, folder.Write("arm.xml", arm), "", &said);
+  const auto model = ReadMjcf(arm, folder.Write("arm.xml", arm), {}, &said);
   ASSERT_TRUE(model) << said.Text();
   const Mechanism& m = model->mechanism;
   for (int k = 0; k < 12; ++k) {

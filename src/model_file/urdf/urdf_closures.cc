@@ -17,6 +17,7 @@
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
 #include "model_file/element_text.h"
+#include "model_file/model_contacts.h"
 #include "model_file/model_drives.h"
 #include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
@@ -606,9 +607,9 @@ class Companion {
     WriteDrives();
     WriteRest();
     std::string text =
-        fmt::format("name: {}\nurdf:\n  file: \"{}\"\n  constraints: false\n{}{}gravity: {}\n",
+        fmt::format("name: {}\nurdf:\n  file: \"{}\"\n  constraints: false\n{}{}{}gravity: {}\n",
                     YamlName(m_.name), urdf_file, guesses_.empty() ? "" : "  guess:\n", guesses_,
-                    List(m_.gravity_W));
+                    CompensationText(), List(m_.gravity_W));
     if (std::ranges::any_of(m_.bodies,
                             [](const Body& b) { return !ImpossibleInertia(b).empty(); })) {
       text += "allow: impossible_inertia\n";
@@ -653,10 +654,28 @@ class Companion {
     }
   }
 
+  [[nodiscard]] std::string CompensationText() const {
+    std::string text;
+    for (const Body& body : m_.bodies) {
+      if (body.gravity_compensation == 0.0) continue;
+      text += fmt::format("    \"{}\": {}\n", body.name, body.gravity_compensation);
+    }
+    return text.empty() ? "" : "  gravity_compensation:\n" + text;
+  }
+
   void WriteClosures() {
-    for (const Joint& joint : m_.joints) {
+    for (size_t j = 0; j < m_.joints.size(); ++j) {
+      const Joint& joint = m_.joints[j];
       if (!joint.closure) continue;
       const std::string name = YamlName(joint.name);
+      const auto contact = std::ranges::find(m_.contacts, static_cast<int>(j), &Contact::joint);
+      if (contact != m_.contacts.end()) {
+        const std::string foot = Attach(joint.child, name + "_foot", joint.X_CM);
+        const std::string ground = Attach(joint.parent, name + "_ground", joint.X_PF);
+        sections_["contacts"] += fmt::format("  {}: {{on: {}, to: {}, {}}}\n", name, foot, ground,
+                                             internal::ContactText(*contact));
+        continue;
+      }
       std::string line =
           fmt::format("  {}: {{kind: {}, parent: {}, child: {}", name, WordOf(joint.kind),
                       Attach(joint.parent, name + "_parent", joint.X_PF),
@@ -704,6 +723,7 @@ class Companion {
         if (drive.radius > 0.0) line += fmt::format(", radius: {}", drive.radius);
       }
       if (IsLimited(drive.range)) line += ", range: " + RangeText(drive.range);
+      if (drive.compensates_gravity) line += ", gravity_compensation: true";
       sections_["drives"] += line + "}\n";
     }
     for (const Motor& motor : m_.motors) {
