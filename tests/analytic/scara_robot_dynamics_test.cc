@@ -17,7 +17,7 @@ Parameters WithGravity() {
   return p;
 }
 
-Instant At(const Parameters& p, const Vec4& X) {
+Instant InstantAt(const Parameters& p, const Vec4& X) {
   Instant at;
   EXPECT_TRUE(InversePosition(p, X, &at.position).ok());
   return at;
@@ -26,7 +26,7 @@ Instant At(const Parameters& p, const Vec4& X) {
 TEST(ScaraDynamics, StaticTorquesMatchTheHandCalculation) {
   // Half of each rod's weight goes to each end; the rod tensions balance the platform.
   const Parameters p = WithGravity();
-  const Instant at = At(p, PoseOf(-50, -50, -150, 0));
+  const Instant at = InstantAt(p, PoseOf(-50, -50, -150, 0));
   EXPECT_NEAR(at.position.theta[0] / kDeg, 65.704811, 1e-6);
   EXPECT_NEAR(at.position.theta[2] / kDeg, 1.480306, 1e-6);
   const Vec4 M = DriveTorques(p, at.position, at.rates, kToolForce, 0.0);
@@ -39,7 +39,7 @@ TEST(ScaraDynamics, StaticTorquesMatchTheHandCalculation) {
 
 TEST(ScaraDynamics, RodTensionsByHandGiveTheStaticTorques) {
   const Parameters p = WithGravity();
-  const Instant at = At(p, PoseOf(-50, -50, -150, 0));
+  const Instant at = InstantAt(p, PoseOf(-50, -50, -150, 0));
   // Balance of the platform with half of each rod's weight: Σ N η = load, Σ N η·k = 0.
   Vec4 load;
   load << 0, 0, -(p.m_p * 9.81 + 2 * p.m_rods * 9.81 + 5), 0;
@@ -60,7 +60,7 @@ TEST(ScaraDynamics, NothingActsAtRestWithoutGravityAndForce) {
   Parameters p = PaperParameters();
   p.gravity_W.setZero();
   for (const Vec4& X : QuadrantPoses(10, 41)) {
-    const Instant at = At(p, X);
+    const Instant at = InstantAt(p, X);
     EXPECT_EQ(DriveTorques(p, at.position, at.rates, Vec3::Zero(), 0.0).norm(), 0.0);
     const Vec3 F(1, -2, 3);
     Vec4 wrench;
@@ -218,7 +218,7 @@ Command CommandOf(const std::string& name, Coordinate coordinate, Profile profil
 }
 
 Motion SineMotion(const Parameters& p, const SineCase& c) {
-  const Instant home = At(p, c.home_X);
+  const Instant home = InstantAt(p, c.home_X);
   Motion motion;
   motion.duration_s = 10;
   motion.sample_s = 0.1;
@@ -293,7 +293,7 @@ TEST(ScaraClosedForm, LoadInBodyAxesAtAPointTurnsWithThePlatform) {
   ASSERT_TRUE(loaded->Dynamics(command, &sample).ok());
   // By hand: the force turned by the yaw, its moment about z as a cross product.
   const Parameters p = WithGravity();
-  Instant at = At(p, Vec4(command.position));
+  Instant at = InstantAt(p, Vec4(command.position));
   at.rates.dX = command.velocity;
   at.rates.ddX = command.acceleration;
   DriveRates(p, at.position, &at.rates);
