@@ -46,6 +46,7 @@ inline std::vector<StiffnessPose> RandomPoses(int count, std::uint64_t seed) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   std::vector<StiffnessPose> poses;
+  poses.reserve(static_cast<size_t>(count));
   for (int k = 0; k < count; ++k) {
     poses.push_back({uniform(-0.06, 0.06), uniform(0.30, 0.40), uniform(-8, 8) * kDeg,
                      uniform(-100, 100) * kDeg, uniform(-80, 15) * kDeg, uniform(-0.5, -0.05)});
