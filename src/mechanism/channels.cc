@@ -29,6 +29,7 @@ std::vector<Channel> DriveChannels(const Mechanism& mechanism) {
 
 std::vector<Channel> PoseChannels(const std::string& output, const std::string& frame) {
   std::vector<Channel> channels;
+  channels.reserve(6);
   for (int c = 0; c < 6; ++c) {
     channels.push_back(MakeChannel(Quantity::kPose, PoseUnit(c), output, frame, c));
   }

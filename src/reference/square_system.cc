@@ -53,6 +53,7 @@ std::vector<int> IndependentColumns(const SparseLu::Matrix& columns) {
   }
   Eigen::ColPivHouseholderQR<MatX> qr{MatX(columns)};
   qr.setThreshold(kRankTolerance);
+  chosen.reserve(static_cast<size_t>(qr.rank()));
   for (int k = 0; k < qr.rank(); ++k) chosen.push_back(qr.colsPermutation().indices()[k]);
   std::sort(chosen.begin(), chosen.end());
   return chosen;

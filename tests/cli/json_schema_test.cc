@@ -255,7 +255,7 @@ TEST_F(JsonSchemaTest, SchemasAreClosedSelfContainedAndConsistent) {
       }
     }
     const std::set<std::string> there = unused;
-    const std::function<void(const Json&)> look = [&](const Json& part) {
+    const std::function<void(const Json&)> look = [&, &file = file](const Json& part) {
       if (part.is_object() && part.contains("properties") && part["properties"].is_object()) {
         EXPECT_TRUE(part.contains("additionalProperties")) << file << ": " << part.dump();
         EXPECT_NE(part.value("additionalProperties", Json(true)), Json(true)) << file;

@@ -219,14 +219,13 @@ HeadingSense SenseOfRest(const Words& before, const Words& behind, bool strict) 
   for (const std::string& word : before) look(word, strict);
   units.clear();
   for (const std::string& word : behind) look(word, true);
-  if (other) {
+  const bool several = !commanded && sense.word.empty() && quantities.size() > 1;
+  if (other || several) {
     sense.kind = HeadingSense::Kind::kElse;
   } else if (commanded) {
     sense.kind = HeadingSense::Kind::kCommanded;
   } else if (!sense.word.empty()) {
     sense.kind = strict ? HeadingSense::Kind::kElse : HeadingSense::Kind::kNoQuantity;
-  } else if (quantities.size() > 1) {
-    sense.kind = HeadingSense::Kind::kElse;
   } else if (!quantities.empty()) {
     sense.quantity = *quantities.begin();
   }

@@ -196,6 +196,7 @@ class LogRun {
     }
     if (findings_.has_errors()) return false;
     std::vector<Coordinate> coordinates;
+    coordinates.reserve(candidates.size());
     for (const size_t a : candidates) coordinates.push_back(axes_[a].coordinate);
     const CoordinateChoice choice =
         ChooseCoordinates(robot_.mechanism, coordinates, coordinates.size());

@@ -377,6 +377,7 @@ struct ForeignMjcf::Impl {
       if (IsTag(e, "joint") && ElementOf(e) == "body/joint") joints.push_back(e);
     });
     std::vector<std::string> numbers;
+    numbers.reserve(joints.size());
     for (const XMLElement* e : joints) numbers.push_back(JointNumbers(e));
     for (size_t j = 0; j < joints.size(); ++j) {
       for (const char* of : {"actuatorgravcomp", "actuatorfrclimited", "actuatorfrcrange"}) {
