@@ -1,5 +1,5 @@
 // The layer table of docs/development/architecture.md against CMakeLists.txt and against the includes: nothing
-// beyond the table, and no permit that nobody uses.
+// beyond the table, and no unused permit.
 //   node check_layers.mjs ROOT
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';

@@ -150,7 +150,7 @@ function selfTest() {
   const header = { 'src/b/y.h': 'namespace mbv {\nstruct Load {\n};\n' };
   const other = { 'src/a/z.cc': '#include "b/y.h"\n' };
   if (check({ 'src/a/x.cc': file('int Load(int x) {'), ...other }, header).length !== 1) return 'a type of a header';
-  if (check({ 'src/a/x.cc': file('int Load(int x) {') }, header).length !== 0) return 'a type that nobody includes';
+  if (check({ 'src/a/x.cc': file('int Load(int x) {') }, header).length !== 0) return 'a type without includers';
   const same = file('int Once() {');
   if (check({ 'src/a/x.cc': same, 'src/b/x.cc': same }).length !== 0) return 'one name in two layers';
   if (both('struct Row;\nusing internal::Row;\nusing Json = nlohmann::json;', 'int Shared(int x);').length !== 0) return 'declarations that may occur twice';

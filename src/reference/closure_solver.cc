@@ -631,7 +631,7 @@ constexpr double kRatesGood = 1e-12, kRatesAccurate = 1e-9;
 constexpr double kBiasRounding = 32 * kEps;
 constexpr int kMostSolutions = 12;
 // Velocities that changed by more of themselves since biases were evaluated have changed these.
-// What they missed does not tell: near singular poses little that misses is much that changes.
+// What they missed does not show it: near singular poses little that misses is much that changes.
 constexpr double kRatesSettled = 1e-14;
 
 // Of the command rows; those of idle spins, behind them, are zero.

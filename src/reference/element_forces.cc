@@ -105,18 +105,6 @@ void ForElements(const Mechanism& mechanism, const BodyStates& states,
   }
 }
 
-void TakeCarrierMoments(const Mechanism& mechanism, const BodyStates& states,
-                        std::vector<Vec6>* wrench_W) {
-  ForElements(mechanism, states, {},
-              [&](const auto& law, const ScalarRow& /*row*/, const AlongElement& at) {
-                if constexpr (std::is_same_v<std::decay_t<decltype(law)>, RotorLaw>) {
-                  if (!law.carrier) return;
-                  auto moment = (*wrench_W)[static_cast<size_t>(law.carrier->body)].head<3>();
-                  moment -= CarrierMoment(law, at);
-                }
-              });
-}
-
 }  // namespace
 
 void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
@@ -126,8 +114,12 @@ void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
                 const double force = ForceOf(law, at);
                 (*wrench_W)[static_cast<size_t>(row.parent)] -= force * row.J_parent;
                 (*wrench_W)[static_cast<size_t>(row.child)] -= force * row.J_child;
+                if constexpr (std::is_same_v<std::decay_t<decltype(law)>, RotorLaw>) {
+                  if (!law.carrier) return;
+                  auto moment = (*wrench_W)[static_cast<size_t>(law.carrier->body)].head<3>();
+                  moment -= CarrierMoment(law, at);
+                }
               });
-  TakeCarrierMoments(mechanism, states, wrench_W);
 }
 
 void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, Energies* energy) {

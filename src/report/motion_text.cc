@@ -1,4 +1,4 @@
-// The verdict table of a motion for people.
+// The verdict table of a motion on the terminal.
 #include <fmt/format.h>
 
 #include <algorithm>

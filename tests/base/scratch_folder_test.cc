@@ -1,4 +1,4 @@
-// Folders for files that nobody keeps.
+// Folders for temporary files.
 #include "base/scratch_folder.h"
 
 #include <gtest/gtest.h>
@@ -148,7 +148,7 @@ TEST(ScratchFolder, OfAKilledProcessGoesWithTheNextOne) {
   const Other killed = InOtherProcess(Fill), living = InOtherProcess(Fill);
   EXPECT_EQ(EndOf(killed, SIGKILL), SIGKILL);
   EXPECT_TRUE(fs::exists(killed.folder));
-  // Of a like name, but nobody's scratch folder.
+  // Of a like name, but no scratch folder.
   const fs::path own = outer.path() / "mbverify-data-backup";
   fs::create_directory(own);
   std::ofstream(own / "thesis.csv") << "x";

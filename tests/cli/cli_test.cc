@@ -114,7 +114,7 @@ TEST_F(CliTest, UrdfIsCompletedByTheFileBesideIt) {
       EXPECT_TRUE(has(back.out, key)) << key << "\n" << back.out;
       EXPECT_FALSE(has(alone.out, key)) << key;
     }
-    // One that somebody else wrote stays, and nothing is written.
+    // One that mbverify did not write stays, and nothing is written.
     std::ofstream(companion) << "shopping: list\n";
     fs::remove(urdf);
     EXPECT_EQ(mbverify("model " + model + " --format urdf --out " + urdf).exit_code, 2);
@@ -421,7 +421,7 @@ TEST_F(CliTest, RegressShowsALiveTableOnATerminal) {
   EXPECT_EQ(plain.err.find("running"), std::string::npos) << plain.err;
 }
 
-// A scenario of somebody else, whose program leaves a file.
+// An untrusted scenario whose program leaves a file.
 class TheirProgram {
  public:
   explicit TheirProgram(const std::string& name) : mbverify_("trust_" + name) {

@@ -72,7 +72,7 @@ std::string GithubTrouble(const YAML::Node& workflow) {
 TEST(NightlyExamples, TheGithubWorkflowHangsTogether) {
   const YAML::Node workflow = YAML::LoadFile(kNightly + "github-nightly.yml");
   EXPECT_EQ(GithubTrouble(workflow), "");
-  // One build for all of the regression, from kept objects; nobody else compiles.
+  // One build for all of the regression, from kept objects; no other test compiles.
   const YAML::Node jobs = workflow["jobs"];
   EXPECT_NE(AllRunText(jobs["build"]).find("scripts/setup --target mbverify"), std::string::npos);
   for (const char* job : {"shard", "report"}) {

@@ -353,7 +353,7 @@ TEST(YamlReader, APipeIsReadAsOftenAsItIsAskedFor) {
   const auto first = YamlReader(pipe).ReadFile();
   writer.join();
   EXPECT_EQ(first, "a: 1\n");
-  EXPECT_EQ(YamlReader(pipe).ReadFile(), "a: 1\n") << "nobody writes any more";
+  EXPECT_EQ(YamlReader(pipe).ReadFile(), "a: 1\n") << "the writer has closed it";
 }
 
 TEST(YamlReader, AMissingFileAndAFolderAreFindings) {

@@ -187,7 +187,7 @@ TEST_F(LoadScenarioTest, AStepThatDoesNotDivideTheSamplesIsMadeToFitAloud) {
                                            "divide motion.sample_s = 0.01: the step is 0.0025 s"),
             std::string::npos)
       << stated.diagnostics.Text();
-  // The default step is nobody's choice.
+  // The default step is not the user's choice.
   for (const auto& [sample_s, step_s] : {std::pair{"0.0005", 0.0005}, {"0.0125", 0.0125 / 13}}) {
     const ScenarioResult result = Load(Complete(), {{"motion.sample_s", sample_s}});
     ASSERT_TRUE(result.scenario) << result.diagnostics.Text();

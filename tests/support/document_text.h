@@ -5,7 +5,7 @@
 
 namespace mbv::test {
 
-/// C++ writes 1e-06 where people write 1e-6.
+/// C++ writes 1e-06 where documents write 1e-6.
 inline std::string AsPeopleWrite(const std::string& line) {
   std::string plain;
   for (size_t i = 0; i < line.size(); ++i) {

@@ -28,7 +28,7 @@ inline void ExpectGolden(const std::string& name, const std::string& actual) {
   EXPECT_EQ(actual, Golden(name, actual)) << name;
 }
 
-/// Numbers to ten digits: what an eigenvalue's last digits are is nobody's promise.
+/// Numbers to ten digits: an eigenvalue's last digits are not reproducible.
 inline nlohmann::ordered_json Rounded(nlohmann::ordered_json json) {
   if (json.is_structured()) {
     for (auto& item : json) item = Rounded(item);

@@ -64,6 +64,7 @@ class LogRun {
     auto log = ReadLog(arguments_.log, settings_, axes_, &findings_);
     if (!log) return BadInput();
     log_ = std::move(*log);
+    CheckLimit();
     if (!ChooseCommands()) return BadInput();
     if (!arguments_.ignore_ranges && !CheckLogRanges(log_, axes_, &findings_)) return BadInput();
     printer_.Print(findings_);
@@ -237,6 +238,16 @@ class LogRun {
     return false;
   }
 
+  // A limit of what is not compared would hold of every log.
+  void CheckLimit() {
+    if (std::isnan(arguments_.limit)) return;
+    for (size_t a = 0; a < axes_.size(); ++a) {
+      if (axes_[a].driven() && log_.Find(a, LogQuantity::kEffort) != nullptr) return;
+    }
+    AddError(log_.file, "has no effort of a drive, which --limit is about",
+             "--column NAME.effort=HEADING names one");
+  }
+
   [[nodiscard]] bool Shapes(size_t axis) const {
     return !settings_.positions_only && log_.Find(axis, LogQuantity::kVelocity) != nullptr;
   }
@@ -307,8 +318,6 @@ class LogRun {
     if (robot_.made) text += "analytic: none\n";
     text += fmt::format("simulation: {{mode: {}, stock_too: false{}}}\n", arguments_.mode,
                         arguments_.ignore_ranges ? ", ignore_ranges: true" : "");
-    // What only holds carries next to nothing: no scale of its own to judge it by.
-    if (!commands_.held.empty()) text += "checks: {force_nrmse_own: off}\n";
     return text + "snapshots: {times_s: [0]}\n";
   }
 

@@ -189,7 +189,7 @@ class LogFitter {
     const std::vector<Kind> wanted = {Kind::kOffset,  Kind::kGain,  Kind::kCoulomb,
                                       Kind::kViscous, Kind::kDelay, Kind::kInertia};
     std::vector<int> taken = Separable(columns, wanted);
-    // A force that hardly changes within the longest delay does not tell one.
+    // A force that hardly changes within the longest delay determines no delay.
     const double change = columns.col(static_cast<int>(Kind::kDelay)).norm() * most_delay_s_;
     const bool delays = change > kChanges * y.norm() &&
                         std::ranges::count(taken, static_cast<int>(Kind::kDelay)) > 0;

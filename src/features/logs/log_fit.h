@@ -36,7 +36,7 @@ struct LogTerm {
   Kind kind = Kind::kGain;
   double value = kNan, error = kNan;  ///< standard error
   double effect = 0.0;                ///< RMS of what it changes [N or N m]
-  bool fitted = false;                ///< false: the log does not tell it from the others
+  bool fitted = false;                ///< false: the log does not distinguish it from the others
   bool named = false;                 ///< beyond 3 standard errors and 0.5 % of the log's RMS
 
   [[nodiscard]] const char* word() const;  ///< "gain"

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/roles.h"
@@ -345,8 +346,8 @@ Items Sentences(const LogComparison& comparison) {
       items.texts.push_back(drive.name + ": nothing beyond 3 standard errors and 0.5 % of the log");
     }
     if (!alike.empty()) {
-      items.texts.push_back(
-          fmt::format("{}: this motion does not tell {} from the rest", drive.name, Joined(alike)));
+      items.texts.push_back(fmt::format("{}: this motion does not distinguish {} from the rest",
+                                        drive.name, Joined(alike)));
     }
   }
   return items;
@@ -464,7 +465,7 @@ ReportSection ForceSection(const LogComparison& comparison) {
       "+ viscous · v + inertia · a. Standard errors count the correlation of what is left in time. "
       "Rows near rest (1 % of the fastest rate) are left out of the fit. What is named changes at "
       "least 0.5 % of the log's RMS, by 3 standard errors. Friction and inertia are hints: wrong "
-      "masses, a bent zero or a slow sensor can look alike.");
+      "masses, a wrong zero or a slow sensor can look alike.");
   return section;
 }
 
@@ -485,9 +486,11 @@ LogComparison CompareLog(const RobotLog& log, const std::vector<LogAxis>& axes,
 }
 
 double LargestShare(const LogComparison& comparison) {
-  double largest = 0.0;
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  double largest = comparison.drives.empty() ? kAll : 0.0;
   for (const LogDrive& drive : comparison.drives) {
-    if (std::isfinite(drive.fit.share())) largest = std::max(largest, drive.fit.share());
+    const double share = drive.fit.rms_difference == 0.0 ? 0.0 : drive.fit.share();
+    largest = std::isnan(share) ? kAll : std::max(largest, share);
   }
   return largest;
 }

@@ -54,7 +54,8 @@ struct LogComparison {
                                        const std::vector<bool>& shaping, const Report& report,
                                        double most_delay_s);
 
-/// The largest share of a drive; 0 without one.
+/// The largest share of a drive; infinite where a log is zero and the model is not, and without
+/// one.
 [[nodiscard]] double LargestShare(const LogComparison& comparison);
 
 /// For a terminal.

@@ -154,7 +154,9 @@ bool SetUpRobot(const std::string& robot, const RunArguments& arguments, Finding
     }
   }
   if (!arguments.quiet) {
-    Say(stderr, "{} is run by {}; go on from there\n", robot, first.string());
+    const std::string model = CompletedModel(robot);
+    Say(stderr, "{}{} is run by {}; go on from there\n", robot,
+        model == robot ? "" : ", completed by " + model + ",", first.string());
   }
   *scenario = first.string();
   return true;

@@ -167,7 +167,7 @@ ReportSection Quantities(const StudyReport& report) {
   return section;
 }
 
-// What the estimates cannot tell: intervals that are wide, and a part that is larger than the
+// What the estimates leave open: intervals that are wide, and a part that is larger than the
 // whole.
 std::string ResolutionText(const StudyReport& report, const QuantitySummary& q) {
   constexpr double kCoarse = 0.2;  // of the variance: a main effect and none look alike

@@ -239,7 +239,7 @@ bool HasWord(std::string_view words, std::string_view word) {
   }
 }
 
-// True for an element of which some row tells.
+// True for an element with a row of its own.
 bool IsKnownElement(std::string_view element) {
   const std::string_view tag = element.substr(element.rfind('/') + 1);
   return std::ranges::any_of(kRows, [&](const SdfRow& row) {

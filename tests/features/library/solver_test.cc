@@ -445,7 +445,7 @@ TEST_P(SolverOfModel, AStateDoesNotDependOnWhatWasAskedBefore) {
 INSTANTIATE_TEST_SUITE_P(All, SolverOfModel, testing::ValuesIn(ShippedModelNames()),
                          [](const auto& info) { return info.param; });
 
-// The same of other people's robots, of which the project has none: URDF and MJCF files below the
+// The same of public robots, of which the project has none: URDF and MJCF files below the
 // folder $MBVERIFY_ROBOTS that can be loaded.
 std::vector<std::string> OtherRobots() {
   const char* folder = std::getenv("MBVERIFY_ROBOTS");
@@ -686,12 +686,12 @@ TEST_F(SolverRows, NameTheOnesThatFail) {
 
 TEST_F(SolverRows, EndWhenTheyAreToldTo) {
   MatX drives;
-  Eigen::Index told = 0;
+  Eigen::Index reported = 0;
   const BatchStatus status = solver_.CloseRows(q_, &drives, 1, [&](Eigen::Index done) {
-    told = done;
+    reported = done;
     return false;
   });
-  EXPECT_EQ(told, q_.rows());
+  EXPECT_EQ(reported, q_.rows());
   ASSERT_EQ(status.failed.size(), static_cast<size_t>(q_.rows() - Solver::kBlock));
   EXPECT_THAT(status.failed.front().second.message, HasSubstr("interrupted"));
   EXPECT_TRUE(std::isfinite(drives(0, 0)));

@@ -1,5 +1,6 @@
 // mbverify log as a user types it: a log made of a run's own result comes back, and what is done to
 // it is named with its number.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -286,6 +287,23 @@ TEST_F(LogCommand, LoadsAndParametersAreStated) {
             1e-5);
 }
 
+// Torques that are zero throughout are none. A drive that rests at home is judged like others.
+TEST_F(LogCommand, ALimitNeedsTorques) {
+  std::string rows = "time,left_motor_pos,left_motor_effort\n";
+  for (int i = 0; i < 40; ++i) {
+    rows += fmt::format("{:.3f},{:.9f},0\n", 0.01 * i, 0.05 * std::sin(0.1 * i));
+  }
+  Write("zeros.csv", rows);
+  const std::string call = "log " + File("five_bar.urdf") + " " + File("zeros.csv") +
+                           " --hold right_motor --no-pictures --out " + File("out");
+  const ProgramResult free = mbverify(call);
+  EXPECT_EQ(free.exit_code, 0) << free.out << free.err;
+  const ProgramResult judged = mbverify(call + " --limit 1000");
+  EXPECT_EQ(judged.exit_code, 2) << judged.out << judged.err;
+  const std::string scenario = ReadAll(mbverify.folder() / "out/five_bar/setup/zeros.yaml");
+  EXPECT_EQ(scenario.find("off"), std::string::npos) << scenario;
+}
+
 TEST_F(LogCommand, BadInputWritesNothing) {
   Write("short.csv", "time,left_motor_pos,right_motr_pos\n0,1,2\n");
   std::string rows = "time,left_motor_pos\n";
@@ -300,6 +318,11 @@ TEST_F(LogCommand, BadInputWritesNothing) {
   EXPECT_NE(half.err.find("has no column for the position of right_motor"), std::string::npos)
       << half.err;
   EXPECT_NE(half.err.find("--hold right_motor keeps it at home"), std::string::npos) << half.err;
+  const std::string held = File("five_bar.urdf") + " " + File("half.csv") + " --hold right_motor";
+  const ProgramResult limit = run(held + " --limit 0.5");
+  EXPECT_EQ(limit.exit_code, 2);
+  EXPECT_NE(limit.err.find("has no effort of a drive, which --limit is about"), std::string::npos)
+      << limit.err;
   EXPECT_EQ(run(File("five_bar.urdf") + " " + File("none.csv")).exit_code, 2);
   EXPECT_EQ(run("no_such_model " + File("half.csv")).exit_code, 2);
   EXPECT_EQ(run(File("five_bar.urdf") + " " + File("half.csv") + " --hold elbow").exit_code, 2);

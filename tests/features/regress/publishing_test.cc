@@ -89,7 +89,7 @@ TEST_F(PublishingTest, ScenariosNamedLikeFilesOfTheNightAreRefused) {
   EXPECT_EQ(Calls(), 0);
 }
 
-// A folder called "logs" is the regression's and a model's at once, and nobody loses anything.
+// A folder called "logs" is the regression's and a model's at once, and no file is lost.
 TEST_F(PublishingTest, ScenariosInAFolderCalledLogsHaveLogsOfTheirOwn) {
   Scenario("agree");
   for (const std::string file : {"scenarios/logs/agree.yaml", "scenarios/logs/m/agree.yaml"}) {

@@ -107,7 +107,7 @@ TEST_F(InitModelTest, NothingIsOverwritten) {
 }
 
 TEST_F(InitModelTest, WithOneOfTheTwoInTheWayNeitherIsWritten) {
-  fs::create_directories(folder_ / "scenarios/mine");  // empty, but somebody's
+  fs::create_directories(folder_ / "scenarios/mine");  // empty, but the user's
   EXPECT_TRUE(Init("mine").files.empty());
   EXPECT_FALSE(fs::exists(folder_ / "models"));
   EXPECT_EQ(Entries(), 2u);

@@ -315,7 +315,7 @@ TEST_F(Feet, ALineBearsNoMomentAboutItself) {
       Replaced(Replaced(Fixture("standing_slider"), "kind: sole, length: length, width: width,",
                         "kind: line, length: length,"),
                "com: [0, side, height]", "com: [0, 0, height]");
-  // The freedom about the line is one that no drive holds: it needs a command.
+  // No drive holds the rotation about the line: it needs a command.
   const std::string file = Write(model, motion.Commands());
   EXPECT_NE(CheckFile(file).Text().find("3 degrees of freedom"), std::string::npos)
       << CheckFile(file).Text();

@@ -1,5 +1,5 @@
-// A kind of result that nobody knows: it brings a measurement and ViewOf(), and page, terminal text
-// and summary are there.
+// A kind of result that no feature knows: it brings a measurement and ViewOf(), and page, terminal
+// text and summary are there.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -100,7 +100,7 @@ TEST_F(StudyCommand, GoesOnWithWhatAKillLeft) {
   EXPECT_EQ(Points("killed"), rows);
 }
 
-// What somebody else killed (a machine without memory, say) is computed once more.
+// What was killed from outside (a machine without memory, say) is computed once more.
 TEST_F(StudyCommand, AWorkerThatIsKilledCostsNoPoint) {
   WriteStudy("{latin_hypercube: 8192}");
   const ProgramResult killed = mbverify.Script(

@@ -1,4 +1,4 @@
-// A study's page, terminal text and JSON: every number and word that people decide by.
+// A study's page, terminal text and JSON: every number and word that decisions rest on.
 #include "features/study/study_report.h"
 
 #include <gtest/gtest.h>
