@@ -9,12 +9,18 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <iterator>
+#include <sstream>
 #include <thread>
+
+#include "base/files.h"
 
 namespace mbv {
 namespace {
@@ -47,8 +53,9 @@ void Limit(__rlimit_resource resource, double bytes) {
 }
 
 // In the child, between fork and exec: only calls that are safe there.
+// `in`, `out`: its standard input and output; −1: nothing, and the log.
 [[noreturn]] void BecomeWorker(const WorkerJob& job, char* const* argv, char** variables, int log,
-                               pid_t parent) {
+                               pid_t parent, int in, int out) {
   setpgid(0, 0);  // its own group, to be killed as a whole
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kCannotStart);
@@ -57,9 +64,8 @@ void Limit(__rlimit_resource resource, double bytes) {
   Limit(RLIMIT_DATA, job.data_bytes);
   Limit(RLIMIT_FSIZE, job.file_bytes);
   for (const int ours : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXFSZ}) signal(ours, SIG_DFL);
-  const int nothing = open("/dev/null", O_RDONLY);
-  dup2(nothing, STDIN_FILENO);
-  dup2(log, STDOUT_FILENO);
+  dup2(in < 0 ? open("/dev/null", O_RDONLY) : in, STDIN_FILENO);
+  dup2(out < 0 ? log : out, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
   if (!job.folder.empty() && chdir(job.folder.c_str()) != 0) _exit(kCannotStart);
   environ = variables;
@@ -73,7 +79,7 @@ void Limit(__rlimit_resource resource, double bytes) {
 }
 
 // The worker's process id, or -1 with the reason.
-pid_t Start(const WorkerJob& job, std::string* trouble) {
+pid_t Start(const WorkerJob& job, std::string* trouble, int in = -1, int out = -1) {
   std::error_code error;
   std::filesystem::create_directories(job.log.parent_path(), error);
   const int log = open(job.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_APPEND | O_CLOEXEC, 0666);
@@ -93,7 +99,8 @@ pid_t Start(const WorkerJob& job, std::string* trouble) {
   const pid_t parent = getpid();
   const pid_t pid = fork();
   if (pid == 0) {
-    BecomeWorker(job, argv.data(), job.environment ? variables.data() : environ, log, parent);
+    BecomeWorker(job, argv.data(), job.environment ? variables.data() : environ, log, parent, in,
+                 out);
   }
   if (pid < 0) *trouble = std::string("cannot start a process: ") + std::strerror(errno);
   if (pid > 0) setpgid(pid, pid);  // both sides set it, so that it is set before a kill
@@ -338,6 +345,155 @@ std::string TimeLeft::Text(double fraction, double now_s) {
   if (elapsed_s < kTooEarly_s || fraction <= first_) return "";
   const double left_s = elapsed_s * (1.0 - fraction) / (fraction - first_);
   return left_s < kTooLate_s ? "" : "about " + TimeText(left_s) + " left";
+}
+
+std::optional<std::string> FindProgram(const std::string& program) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (program.find('/') != std::string::npos) {
+    return fs::is_regular_file(program, error) ? std::optional(program) : std::nullopt;
+  }
+  std::vector<fs::path> folders = {ProgramFile().parent_path()};
+  const char* path = std::getenv("PATH");
+  std::istringstream words(path == nullptr ? "" : path);
+  for (std::string word; std::getline(words, word, ':');) folders.emplace_back(word);
+  for (const fs::path& folder : folders) {
+    const fs::path file = folder / program;
+    if (!program.empty() && folder.is_absolute() && fs::is_regular_file(file, error) &&
+        access(file.c_str(), X_OK) == 0) {
+      return file.string();
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> BareEnvironment() {
+  constexpr const char* kHandedOn[] = {"PATH", "HOME", "USER",   "LOGNAME",
+                                       "LANG", "TZ",   "TMPDIR", "MBV_MUJOCO_PACKAGE"};
+  std::vector<std::string> bare;
+  for (const char* name : kHandedOn) {
+    if (const char* value = std::getenv(name)) bare.push_back(fmt::format("{}={}", name, value));
+  }
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    if (std::string_view(*variable).starts_with("LC_")) bare.emplace_back(*variable);
+  }
+  return bare;
+}
+
+namespace {
+
+constexpr size_t kLongestAnswer = 64u << 20;  // bytes
+
+// What `status` of waitpid() says.
+std::string EndText(int status) {
+  if (WIFSIGNALED(status)) return fmt::format("was ended by signal {}", WTERMSIG(status));
+  return fmt::format("ended with exit code {}", WEXITSTATUS(status));
+}
+
+// All of it, although the reader may be gone (no signal then) or slow.
+bool SendAll(int pipe, const std::string& text, Clock::time_point until) {
+  size_t at = 0;
+  while (at < text.size()) {
+    pollfd ready{pipe, POLLOUT, 0};
+    const double left_s = -SecondsSince(until);
+    if (left_s <= 0.0 || poll(&ready, 1, static_cast<int>(1e3 * left_s) + 1) <= 0) return false;
+    const ssize_t n = write(pipe, text.data() + at, text.size() - at);
+    if (n < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (n <= 0) return false;
+    at += static_cast<size_t>(n);
+  }
+  return true;
+}
+
+}  // namespace
+
+bool Conversation::running() const { return pid_ > 0 && owner_ == getpid(); }
+
+Conversation::Answer Conversation::Call(const std::string& line, double timeout_s) {
+  if (!running()) {
+    End();
+    std::array<int, 2> in{-1, -1}, out{-1, -1};
+    if (pipe2(in.data(), O_CLOEXEC) != 0 || pipe2(out.data(), O_CLOEXEC) != 0) {
+      for (const int end : {in[0], in[1], out[0], out[1]}) {
+        if (end >= 0) close(end);
+      }
+      return {.line = {}, .trouble = Trouble::kNotStarted, .how = std::strerror(errno)};
+    }
+    std::string trouble;
+    const pid_t pid = Start(job_, &trouble, in[0], out[1]);
+    close(in[0]);
+    close(out[1]);
+    to_ = in[1];
+    from_ = out[0];
+    if (pid < 0) {
+      End();
+      return {.line = {}, .trouble = Trouble::kNotStarted, .how = trouble};
+    }
+    fcntl(to_, F_SETFL, fcntl(to_, F_GETFL) | O_NONBLOCK);
+    pid_ = pid;
+    owner_ = getpid();
+  }
+  const Clock::time_point until = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                                     std::chrono::duration<double>(timeout_s));
+  const auto slow = [&] { return fmt::format("took longer than {:g} s", timeout_s); };
+  // A program that ends early must not end this one.
+  struct sigaction ignore {
+  }, before{};
+  ignore.sa_handler = SIG_IGN;
+  sigaction(SIGPIPE, &ignore, &before);
+  const bool sent = SendAll(to_, line + '\n', until);
+  sigaction(SIGPIPE, &before, nullptr);
+  if (!sent && -SecondsSince(until) <= 0.0) return Lost(Trouble::kTimedOut, slow());
+  std::array<char, 65536> bytes;
+  while (true) {
+    if (const size_t end = received_.find('\n'); end != std::string::npos) {
+      Answer answer{.line = received_.substr(0, end)};
+      received_.erase(0, end + 1);
+      return answer;
+    }
+    if (received_.size() > kLongestAnswer) return Lost(Trouble::kEnded, "answered without end");
+    pollfd ready{from_, POLLIN, 0};
+    const double left_s = -SecondsSince(until);
+    const int any = left_s <= 0.0 ? 0 : poll(&ready, 1, static_cast<int>(1e3 * left_s) + 1);
+    if (any < 0 && errno == EINTR) continue;
+    if (any <= 0) return Lost(Trouble::kTimedOut, slow());
+    const ssize_t n = read(from_, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return Lost(Trouble::kEnded, "");
+    received_.append(bytes.data(), static_cast<size_t>(n));
+  }
+}
+
+Conversation::Answer Conversation::Lost(Trouble trouble, const std::string& how) {
+  Answer answer{.line = {}, .trouble = trouble, .how = how};
+  int status = 0;
+  if (trouble != Trouble::kEnded || !how.empty()) kill(-pid_, SIGKILL);
+  // One that closed its pipes may go on.
+  for (int k = 0; k < 100 && waitpid(pid_, &status, WNOHANG) == 0; ++k) {
+    if (k == 50) kill(-pid_, SIGKILL);
+    std::this_thread::sleep_for(kPause);
+  }
+  kill(-pid_, SIGKILL);
+  pid_ = 0;
+  if (how.empty()) answer.how = EndText(status);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kCannotStart) {
+    answer.trouble = Trouble::kNotStarted;
+    answer.how = "could not be started";
+  }
+  End();
+  return answer;
+}
+
+void Conversation::End() {
+  if (to_ >= 0) close(to_);
+  if (from_ >= 0) close(from_);
+  to_ = from_ = -1;
+  received_.clear();
+  if (running()) {
+    kill(-pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  pid_ = 0;
 }
 
 }  // namespace mbv

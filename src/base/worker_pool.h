@@ -82,6 +82,49 @@ void ShareOut(size_t count, int jobs, const std::function<std::string(size_t)>& 
 [[nodiscard]] std::vector<std::optional<std::string>> InChildren(
     size_t count, double timeout_s, const std::function<std::string(size_t)>& work);
 
+// A program that answers line by line, kept running between calls.
+
+/// The file that a command's first word stands for: a path as it is, else what lies beside
+/// mbverify, else what the absolute folders of PATH have. Empty if there is none.
+[[nodiscard]] std::optional<std::string> FindProgram(const std::string& program);
+
+/// What another person's program gets to know of the environment: where programs and its own
+/// settings are, the language of its messages, and where temporary files go. Nothing that opens
+/// doors.
+[[nodiscard]] std::vector<std::string> BareEnvironment();
+
+/// Started at the first call; dies with this object and with this process. Not for two threads.
+class Conversation {
+ public:
+  /// `job.log` gets what the program writes to standard error.
+  explicit Conversation(WorkerJob job) : job_(std::move(job)) {}
+  ~Conversation() { End(); }
+  Conversation(const Conversation&) = delete;
+  Conversation& operator=(const Conversation&) = delete;
+
+  /// Why a call has no answer.
+  enum class Trouble { kNone, kNotStarted, kEnded, kTimedOut };
+  struct Answer {
+    std::string line;  ///< without its end
+    Trouble trouble = Trouble::kNone;
+    std::string how = {};  ///< of trouble: "was ended by signal 9"
+  };
+  /// Writes `line` and waits for one; after trouble the program is gone, and the next call starts
+  /// it again. A process that forked has its own.
+  [[nodiscard]] Answer Call(const std::string& line, double timeout_s);
+  /// Whether the next call would find the program running.
+  [[nodiscard]] bool running() const;
+  void End();
+
+ private:
+  [[nodiscard]] Answer Lost(Trouble trouble, const std::string& how);
+
+  WorkerJob job_;
+  int pid_ = 0, owner_ = 0;  // of the program, and of the process that started it
+  int to_ = -1, from_ = -1;  // pipes
+  std::string received_;     // behind the last line
+};
+
 // How long something will take, in words.
 
 /// "12 s", "3 min", "2.5 h".

@@ -307,6 +307,11 @@ std::vector<Caveat> CaveatsOf(const ComparisonInput& input, const Comparison& co
     all.push_back(LeftOutCaveat(text));
   }
   for (Caveat& contact : ContactCaveats(input)) all.push_back(std::move(contact));
+  if (!input.unchecked_coverage.empty()) {
+    all.push_back({.kind = CaveatKind::kCoverage,
+                   .of = {role::kAnalytic.name},
+                   .text = "analytic: " + input.unchecked_coverage});
+  }
   if (Caveat own = IntegrationErrors(input, comparison); !own.of.empty()) {
     all.insert(all.begin(), std::move(own));
   }

@@ -476,6 +476,8 @@ const char* ToText(CaveatKind kind) {
       return "left_out";
     case CaveatKind::kContact:
       return "contact";
+    case CaveatKind::kCoverage:
+      return "coverage";
   }
   return "?";
 }

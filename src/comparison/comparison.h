@@ -92,6 +92,7 @@ struct ComparisonInput {
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
   std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
+  std::string unchecked_coverage = {};  ///< why nobody knows what the analytic witness covers
   /// The witnesses bring stiffnesses instead of traces; the motion is the pose, commanded.
   bool of_stiffness = false;
 };
@@ -262,6 +263,7 @@ enum class CaveatKind {
   kWitnessInPart,   ///< a program gave the forces of some drives only
   kLeftOut,         ///< what acts on forces in a robot's file and not in the model
   kContact,         ///< a foot that is computed as holding would lift, slip, tip or twist
+  kCoverage,        ///< what a closed form takes for granted is not stated
 };
 [[nodiscard]] const char* ToText(CaveatKind kind);  ///< "witness_missing"
 

@@ -784,7 +784,8 @@ def _number(x):
     for number in numbers:
         if not _is_number(number) or isinstance(number, bool):
             raise TypeError(f"gave a {type(number).__name__} where a number is wanted")
-    return [float(number) for number in numbers]
+    numbers = [float(number) for number in numbers]
+    return [number if math.isfinite(number) else None for number in numbers]
 
 
 def _numbers(x):
@@ -930,6 +931,8 @@ class _Host:
             if isinstance(error, (KeyboardInterrupt, SystemExit)):
                 raise
             return {"failed": f"{type(error).__name__}: {error}"}
+        finally:
+            self.load()
 
 
 def _last_line(function):

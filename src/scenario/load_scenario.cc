@@ -97,6 +97,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     // Numbers from here on may be expressions of the model's parameters.
     scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
+    FindEquations(map.Find("analytic"));
     scenario_.reference = ReadReference(&values_, map.Find("reference"));
     scenario_.simulation = ReadSimulation(&values_, map.Find("simulation"));
     scenario_.witnesses =
@@ -120,6 +121,27 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     CheckParameterNames(map);
     if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
     if (!yaml_.has_errors()) CheckDriveMode(*motion, map.Find("simulation"));
+  }
+
+  // The file of equations lies beside the scenario, or beside the model.
+  void FindEquations(const YamlNode* analytic) {
+    std::string& name = scenario_.analytic.equations;
+    if (name.empty()) return;
+    const YamlNode& node = *analytic->Find("equations");
+    std::error_code error;
+    const fs::path path = name;
+    for (const fs::path& folder :
+         {fs::path(file_).parent_path(), fs::path(scenario_.model_file).parent_path()}) {
+      const fs::path found = folder / path;
+      if (!fs::is_regular_file(found, error)) continue;
+      name = found.lexically_normal().string();
+      return;
+    }
+    // An option's file may lie in the working directory.
+    if (scenario_.analytic.equations_typed && fs::is_regular_file(path, error)) return;
+    yaml_.Error(node, fmt::format("analytic.equations = '{}': there is no such file beside the "
+                                  "scenario or its model",
+                                  QuotedValue(name)));
   }
 
   // Feet that stand on the ground in this scenario.
@@ -478,7 +500,9 @@ ScenarioHead ReadScenarioHead(const std::string& file) {
   head.description = word("description");
   head.is_scenario = head.is_scenario || root->Find("mechanism") != nullptr;
   const YamlNode* witnesses = root->Find("witnesses");
-  head.has_witnesses = witnesses != nullptr && witnesses->is_map();
+  const YamlNode* analytic = root->Find("analytic");
+  head.names_programs = (witnesses != nullptr && witnesses->is_map()) ||
+                        (analytic != nullptr && analytic->Find("equations") != nullptr);
   for (const YamlEntry& entry : root->entries) head.keys.push_back(entry.key);
   if (const YamlNode* expect = root->Find("expect")) head.expect = ReadExpectation(&values, expect);
   return head;

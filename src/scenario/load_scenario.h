@@ -55,7 +55,7 @@ class ScenarioMemory;
 /// that is not YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
   bool is_scenario = false;    ///< has a `mechanism:` key (or an expectation)
-  bool has_witnesses = false;  ///< names programs (scenario/load_scenario.h)
+  bool names_programs = false;  ///< witnesses or a file of equations
   std::string kind;            ///< "motion", "stiffness"; "" means motion
   std::string mechanism, description;
   Expectation expect;

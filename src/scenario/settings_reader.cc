@@ -79,7 +79,7 @@ AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node) {
   }
   settings.stated = true;
   YamlReader& yaml = values->yaml();
-  YamlMap map(&yaml, node, "analytic", {"model", "as_printed", "parameters", "required"});
+  YamlMap map(&yaml, node, "analytic", {"model", "as_printed", "parameters", "required", "equations"});
   if (const YamlNode* flag = map.Find("required")) {
     settings.required = yaml.Flag(*flag, "analytic.required").value_or(false);
   }
@@ -94,6 +94,15 @@ AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node) {
     }
   }
   settings.parameters = ReadOverrides(values, map.Find("parameters"), "analytic.parameters");
+  if (const YamlNode* file = map.Find("equations")) {
+    settings.equations = yaml.Text(*file, "analytic.equations").value_or("");
+    settings.equations_typed = file->line < 0;
+    settings.equations_line = std::max(0, file->line);
+    if (map.Has("model") || map.Has("as_printed")) {
+      yaml.Error(*file, "analytic.equations: a file of equations has neither model nor as_printed",
+                 "these choose among the formulations of a built-in closed form");
+    }
+  }
   return settings;
 }
 

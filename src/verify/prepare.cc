@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/text.h"
+#include "equations/file_form.h"
 #include "mechanism/channels.h"
 #include "mechanism/followed_state.h"
 #include "model_file/load_model.h"
@@ -108,8 +109,45 @@ Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Ove
   return base;
 }
 
+namespace {
+
+// The equations of the scenario's file.
+ClosedFormChoice MakeFromFile(const Scenario& scenario, const Mechanism& mechanism,
+                              const ProgramConsent& consent, Diagnostics* diagnostics) {
+  const ProgramList program = EquationProgramOf(scenario, consent.archived);
+  if (consent.none && !program.programs.empty()) {
+    return {nullptr, "its equations are a program, which is not run here"};
+  }
+  if (!consent.Allows(program)) {
+    Finding refusal = Refusal(program);
+    refusal.severity = Severity::kWarning;
+    diagnostics->Add(std::move(refusal));
+    return {nullptr, "its equations are a program that may not run", WitnessGap::kNotApplicable};
+  }
+  Diagnostics found;
+  FileForm made = MakeFileForm(scenario.analytic.equations, mechanism, scenario.motion, &found);
+  diagnostics->Append(found);
+  if (!made.uncovered.empty()) {
+    ClosedFormChoice choice;
+    choice.reason = ReasonNotApplicable(made.uncovered);
+    choice.gap = WitnessGap::kNotApplicable;
+    for (Finding& finding : made.uncovered) {
+      if (finding.file.empty()) finding.file = scenario.analytic.equations;
+      finding.message = "analytic is not applicable: " + finding.message;
+      diagnostics->Add(std::move(finding));
+    }
+    return choice;
+  }
+  if (made.closed_form == nullptr) return {nullptr, "its equations do not work"};
+  ClosedFormChoice choice{std::move(made.closed_form), ""};
+  choice.unchecked = std::move(made.unchecked);
+  return choice;
+}
+
+}  // namespace
+
 ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
-                                Diagnostics* diagnostics) {
+                                const ProgramConsent& consent, Diagnostics* diagnostics) {
   if (!scenario.analytic.on) return {nullptr, "switched off in the scenario"};
   const WitnessGap asked =
       scenario.analytic.stated ? WitnessGap::kNotApplicable : WitnessGap::kNone;
@@ -121,6 +159,9 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
             "closed forms are commanded by drives and outputs, and the motion commands " +
                 NameOf(mechanism, joints.front()),
             asked};
+  }
+  if (!scenario.analytic.equations.empty()) {
+    return MakeFromFile(scenario, mechanism, consent, diagnostics);
   }
   const ClosedFormRow* row = FindClosedForm(mechanism.name);
   if (row == nullptr) {
@@ -159,20 +200,22 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
 }
 
 std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& options,
-                                Diagnostics* diagnostics) {
-  return Prepare(LoadScenario(file, options), diagnostics);
+                                Diagnostics* diagnostics, const ProgramConsent& consent) {
+  return Prepare(LoadScenario(file, options), diagnostics, consent);
 }
 
-std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics) {
+std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics,
+                                const ProgramConsent& consent) {
   diagnostics->Append(loaded.diagnostics);
   if (!loaded.scenario) return {};
   Prepared prepared{.scenario = *std::move(loaded.scenario),
                     .base = *std::move(loaded.mechanism),
                     .mechanisms = {},
-                    .closed_form = {}};
+                    .closed_form = {},
+                    .consent = consent};
   prepared.mechanisms = LoadMechanisms(prepared.scenario, prepared.base, diagnostics);
   prepared.closed_form =
-      MakeClosedForm(prepared.scenario, prepared.mechanisms.analytic, diagnostics);
+      MakeClosedForm(prepared.scenario, prepared.mechanisms.analytic, consent, diagnostics);
   if (prepared.scenario.simulation.on && !prepared.has_closed_form() &&
       !prepared.scenario.reference.on && !prepared.scenario.motion.free()) {
     Finding finding;
@@ -200,7 +243,7 @@ DrivenMotion Prepared::MakeDrivenMotion() const {
   if (!has_closed_form()) return DriveByReference(mechanisms.reference, scenario.motion);
   // A fresh closed form, because it may follow its solution from the start of the motion.
   Diagnostics known;
-  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);
+  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, consent, &known);
   return DriveByClosedForm(scenario.motion, std::move(fresh.closed_form));
 }
 
@@ -210,7 +253,7 @@ DriveForces Prepared::MakeDriveForces() const {
   if (settings.mode != DriveMode::kForceDriven && !servo) return {};
   if (!has_closed_form()) return ForcesByReference(mechanisms.reference, scenario.motion);
   Diagnostics known;
-  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);
+  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, consent, &known);
   return ForcesByClosedForm(scenario.motion, std::move(fresh.closed_form));
 }
 

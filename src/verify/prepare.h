@@ -12,6 +12,7 @@
 #include "mechanism/mechanism.h"
 #include "scenario/load_scenario.h"
 #include "simulation/engine/simulation.h"
+#include "verify/program_consent.h"
 
 namespace mbv {
 
@@ -27,10 +28,12 @@ struct ClosedFormChoice {
                        ///< what the equations cover
   /// kNotApplicable where the scenario counts on one: it asks for it, or the mechanism has one.
   WitnessGap gap = WitnessGap::kNone;
+  std::string unchecked = {};  ///< of a file of equations that does not state what it covers
 };
 /// Unsuitable models, errata and commands are errors; what the equations do not cover of the
 /// mechanism and its loads is a warning each.
 [[nodiscard]] ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
+                                              const ProgramConsent& consent,
                                               Diagnostics* diagnostics);
 
 struct Prepared {
@@ -38,6 +41,7 @@ struct Prepared {
   Mechanism base;  ///< with the scenario's common parameters
   WitnessMechanisms mechanisms;
   ClosedFormChoice closed_form;
+  ProgramConsent consent = {};  ///< with which the equations of a file run
 
   /// The witness whose kinematics the simulation follows.
   [[nodiscard]] const Role& driver() const;
@@ -60,11 +64,14 @@ void AddFormFindings(const std::string& scenario_file, const Diagnostics& found,
                      Diagnostics* diagnostics);
 
 /// Loads a scenario with everything it needs. Empty after bad input; warnings may remain.
+/// Equations that run as a program run where they are trusted or `consent` allows it.
 [[nodiscard]] std::optional<Prepared> Prepare(const std::string& file,
                                               const ScenarioOptions& options,
-                                              Diagnostics* diagnostics);
+                                              Diagnostics* diagnostics,
+                                              const ProgramConsent& consent = {});
 /// The same of a scenario that was loaded.
-[[nodiscard]] std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics);
+[[nodiscard]] std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics,
+                                              const ProgramConsent& consent = {});
 
 /// The mechanism as each witness sees it. Findings are bad input.
 [[nodiscard]] WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base,

@@ -1,13 +1,10 @@
 #include "verify/program_call.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <iterator>
-#include <sstream>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -24,22 +21,6 @@ constexpr const char* kLog = "log";
 
 constexpr const char* kInstalled[] = {"mbverify-witness-simbody", "mbverify-witness-mujoco"};
 
-// What a program gets to know of the environment: where programs and its own settings are, the
-// language of its messages, and where temporary files go. Nothing that opens doors.
-constexpr const char* kHandedOn[] = {"PATH", "HOME", "USER",   "LOGNAME",
-                                     "LANG", "TZ",   "TMPDIR", "MBV_MUJOCO_PACKAGE"};
-
-std::vector<std::string> BareEnvironment() {
-  std::vector<std::string> bare;
-  for (const char* name : kHandedOn) {
-    if (const char* value = std::getenv(name)) bare.push_back(fmt::format("{}={}", name, value));
-  }
-  for (char** variable = environ; *variable != nullptr; ++variable) {
-    if (std::string_view(*variable).starts_with("LC_")) bare.emplace_back(*variable);
-  }
-  return bare;
-}
-
 fs::path FolderOfMbverify() { return ProgramFile().parent_path(); }
 
 }  // namespace
@@ -48,25 +29,6 @@ bool IsInstalledProgram(const std::string& program) {
   std::error_code error;
   return std::ranges::find(kInstalled, program) != std::end(kInstalled) &&
          fs::is_regular_file(FolderOfMbverify() / program, error);
-}
-
-std::optional<std::string> FindProgram(const std::string& program) {
-  std::error_code error;
-  if (program.find('/') != std::string::npos) {
-    return fs::is_regular_file(program, error) ? std::optional(program) : std::nullopt;
-  }
-  std::vector<fs::path> folders = {FolderOfMbverify()};
-  const char* path = std::getenv("PATH");
-  std::istringstream words(path == nullptr ? "" : path);
-  for (std::string word; std::getline(words, word, ':');) folders.emplace_back(word);
-  for (const fs::path& folder : folders) {
-    const fs::path file = folder / program;
-    if (!program.empty() && folder.is_absolute() && fs::is_regular_file(file, error) &&
-        access(file.c_str(), X_OK) == 0) {
-      return file.string();
-    }
-  }
-  return std::nullopt;
 }
 
 std::string ProgramCall::WriteInput(const std::string& name, const std::string& text) const {

@@ -13,10 +13,6 @@ namespace mbv {
 /// Programs that mbverify installs beside itself.
 [[nodiscard]] bool IsInstalledProgram(const std::string& program);
 
-/// The file that a command's first word stands for: a path as it is, else what lies beside
-/// mbverify, else what the absolute folders of PATH have. Empty if there is none.
-[[nodiscard]] std::optional<std::string> FindProgram(const std::string& program);
-
 /// Why a program gave nothing.
 struct ProgramFailure {
   WitnessGap gap = WitnessGap::kNotStarted;

@@ -9,8 +9,11 @@
 #include <sstream>
 
 #include "base/files.h"
+#include "base/roles.h"
 #include "base/sha256.h"
 #include "base/text.h"
+#include "base/worker_pool.h"
+#include "equations/equations.h"
 #include "scenario/find_model.h"
 #include "verify/program_call.h"
 
@@ -77,12 +80,14 @@ std::string ReasonNotTrusted(const fs::path& file, const std::vector<std::string
   return "";
 }
 
-CalledProgram Called(const Scenario& scenario, const ForeignWitness& witness, bool archived) {
-  CalledProgram called{.witness = witness.name, .command = witness.command};
+// `typed`: the command is an option's.
+CalledProgram Called(const Scenario& scenario, const std::string& witness,
+                     const std::vector<std::string>& command, bool typed, bool archived) {
+  CalledProgram called{.witness = witness, .command = command};
   if (const auto program = FindProgram(called.command.front())) called.command.front() = *program;
-  if (witness.typed) {
+  if (typed) {
     called.trust = ProgramTrust::kTyped;
-  } else if (IsInstalledProgram(witness.command.front())) {
+  } else if (IsInstalledProgram(command.front())) {
     called.trust = ProgramTrust::kInstalledProgram;
   } else if (archived) {
     called.reason = "it comes from an archive";
@@ -146,19 +151,32 @@ std::vector<std::string> ProgramList::Lines() const {
 }
 
 ProgramList ProgramsOf(const Scenario& scenario, bool archived) {
-  ProgramList list{.scenario = scenario.file};
+  ProgramList list = EquationProgramOf(scenario, archived);
   for (const ForeignWitness& witness : scenario.witnesses) {
-    list.programs.push_back(Called(scenario, witness, archived));
+    list.programs.push_back(
+        Called(scenario, witness.name, witness.command, witness.typed, archived));
     if (list.line == 0) list.line = witness.line;
   }
   return list;
 }
 
+ProgramList EquationProgramOf(const Scenario& scenario, bool archived) {
+  ProgramList list{.scenario = scenario.file};
+  const AnalyticSettings& analytic = scenario.analytic;
+  if (!analytic.on || !IsEquationProgram(analytic.equations)) return list;
+  list.programs.push_back(Called(scenario, role::kAnalytic.name,
+                                 EquationCommand(analytic.equations), analytic.equations_typed,
+                                 archived));
+  list.line = analytic.equations_line;
+  return list;
+}
+
 ProgramList ProgramsOf(const std::string& file, const ScenarioOptions& options) {
   const ScenarioHead head = ReadScenarioHead(file);
-  const bool set = std::ranges::any_of(
-      options.set, [](const SetValue& value) { return value.first.starts_with("witnesses"); });
-  if (!head.is_scenario || !(head.has_witnesses || set)) {
+  const bool set = std::ranges::any_of(options.set, [](const SetValue& value) {
+    return value.first.starts_with("witnesses") || value.first.starts_with("analytic");
+  });
+  if (!head.is_scenario || !(head.names_programs || set)) {
     return {.scenario = file};
   }
   const ScenarioResult loaded = LoadScenario(file, options);

@@ -52,6 +52,8 @@ struct ProgramList {
 };
 
 [[nodiscard]] ProgramList ProgramsOf(const Scenario& scenario, bool archived = false);
+/// Of them, the one that computes the equations of a file; empty without one.
+[[nodiscard]] ProgramList EquationProgramOf(const Scenario& scenario, bool archived = false);
 /// The same of a file, which is loaded only if it has such a section; empty without programs, and
 /// for what cannot be loaded (whoever runs it says why).
 [[nodiscard]] ProgramList ProgramsOf(const std::string& file, const ScenarioOptions& options);
@@ -61,6 +63,7 @@ struct ProgramConsent {
   bool all = false;       ///< --trust
   bool archived = false;  ///< scenarios come from an archive: neither place nor owner is a reason
   std::set<std::string> agreed = {};  ///< fingerprints of lists
+  bool none = false;      ///< nothing runs, trusted or not
 
   [[nodiscard]] bool Allows(const ProgramList& list) const;
 };

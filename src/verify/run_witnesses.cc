@@ -438,7 +438,8 @@ ComparisonInput InputOf(const Prepared& prepared) {
           .reactions_not_unique = {},
           .mode = simulation.mode,
           .own_parameters = OwnParameters(scenario, prepared.base),
-          .left_out = TextsOf(scenario.model_caveats, ModelCaveat::Kind::kLeftOut)};
+          .left_out = TextsOf(scenario.model_caveats, ModelCaveat::Kind::kLeftOut),
+          .unchecked_coverage = prepared.closed_form.unchecked};
 }
 
 }  // namespace mbv

@@ -42,7 +42,7 @@ std::string HeadJson(const std::string& file) {
   const Json json = {{"counts", kind.runs() || NamesMechanism(text)},
                      {"command", kind.runs() ? kind.command : "run"},
                      {"kind", head.kind},
-                     {"witnesses", head.has_witnesses},
+                     {"witnesses", head.names_programs},
                      {"mechanism", head.mechanism},
                      {"description", head.description},
                      {"verdict", head.expect.verdict},
@@ -68,7 +68,7 @@ Found FoundOf(const std::string& file, const std::optional<std::string>& text) {
   found.counts = json.value("counts", true);
   found.file.command = json.value("command", "run");
   head.kind = json.value("kind", "");
-  head.has_witnesses = json.value("witnesses", false);
+  head.names_programs = json.value("witnesses", false);
   head.mechanism = json.value("mechanism", "");
   head.description = json.value("description", "");
   head.expect.verdict = json.value("verdict", "agree");

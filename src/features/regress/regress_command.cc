@@ -179,7 +179,7 @@ int AskForCases(RegressArguments* arguments) {
   KeepShard(arguments->options.shard, &found.cases);
   std::vector<std::string> files;
   for (const CaseFile& file : found.cases) {
-    if (!file.head.has_witnesses) continue;
+    if (!file.head.names_programs) continue;
     const auto list = InChildren(1, kLongestReading_s,
                                  [&](size_t) { return ProgramsOf(file.file, {}).Fingerprint(); });
     if (!list.front()) continue;

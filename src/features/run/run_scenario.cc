@@ -265,7 +265,7 @@ class ScenarioRun {
 
   RunOutcome Run() {
     const auto start = std::chrono::steady_clock::now();
-    prepared_ = Prepare(file_, options_.scenario, &outcome_.diagnostics);
+    prepared_ = Prepare(file_, options_.scenario, &outcome_.diagnostics, options_.programs);
     if (!prepared_) return BadInput();
     const ProgramList programs = ProgramsOf(scenario(), options_.programs.archived);
     if (!options_.programs.Allows(programs)) {

@@ -1,0 +1,166 @@
+// Equations of a user's own file: Python, Octave/MATLAB or formulas in YAML.
+//
+// A file declares closed forms (drive positions and forces of a mechanism, as functions of
+// commands) and numbered equations to be audited. Its functions differentiate: given positions,
+// rates and accelerations follow by truncated Taylor arithmetic through the functions themselves.
+// Python and Octave run in a process of their own, started at the first call and kept; formulas are
+// computed here. docs/how-to/equations.md is the users' page.
+#pragma once
+
+#include <array>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/diagnostics.h"
+#include "base/types.h"
+#include "math/profile.h"
+#include "mechanism/motion.h"
+
+namespace mbv {
+
+/// A closed form that a file declares.
+struct FormInfo {
+  std::string mechanism;              ///< Mechanism::name
+  std::vector<std::string> commands;  ///< of a scenario, in the order of the function's arguments
+  int line = 0;
+  bool covers_stated = false;  ///< says what it takes for granted
+  bool has_forces = false, takes_loads = false;
+  bool has_rates = false;  ///< states rates or a Jacobian of its own
+  std::vector<std::pair<std::string, std::string>> outputs;  ///< channel, unit
+};
+
+/// A numbered equation that a file declares.
+struct EquationInfo {
+  std::string number;                        ///< "(14)"
+  std::string gives;                         ///< the quantity that it claims to be
+  std::vector<std::string> arguments;        ///< of the function, without the parameters
+  std::map<std::string, std::string> given;  ///< the quantity that an argument is
+  std::map<std::string, std::vector<std::string>> each;  ///< values of indices
+  std::string printed, corrected, note, unit;            ///< to read
+  double approximation = 0.0;  ///< how far it may be off as printed, in its unit
+  int line = 0, end = 0;       ///< of the function as printed in the file
+  bool has_corrected = false;
+};
+
+/// The states at which a file's equations are audited.
+struct StatesInfo {
+  std::string model;  ///< empty: the file states none
+  std::vector<std::string> coordinates;
+  std::map<std::string, std::array<double, 2>> ranges;
+  std::map<std::string, double> rates, accelerations, parameters;
+  std::optional<Vec3> gravity_W;
+  struct Load {
+    std::string body;
+    Vec3 point_B = Vec3::Zero(), force_W = Vec3::Zero(), moment_W = Vec3::Zero();
+  };
+  std::vector<Load> loads;
+  int samples = 40;
+};
+
+struct EquationsInfo {
+  std::vector<FormInfo> forms;
+  std::vector<EquationInfo> equations;
+  StatesInfo states;
+};
+
+/// Why a function of a file gave nothing.
+struct EquationFailure {
+  enum class Kind {
+    kUnreachable,  ///< it has no pose there
+    kSingular,     ///< it divided by zero
+    kWrong,        ///< an exception, a wrong number of results, one that is not finite
+    kLost,         ///< its program ended or took too long
+    kNotStarted    ///< there is no such interpreter
+  };
+  Kind kind = Kind::kWrong;
+  std::string message;
+  std::string file = {};  ///< where; may be empty
+  int line = 0;
+  std::string function = {};
+  std::vector<Finding> findings = {};  ///< instead of it, where there are several
+
+  /// "message (file:line, in function)".
+  [[nodiscard]] std::string Text() const;
+  [[nodiscard]] std::vector<Finding> Findings() const;
+};
+
+template <typename T>
+struct EquationResult {
+  std::optional<T> value;
+  EquationFailure failure = {};  ///< where there is no value
+
+  explicit operator bool() const { return value.has_value(); }
+};
+
+/// Everything at one instant; NaN where a function gave no finite number.
+struct FormSample {
+  std::vector<Jet> drives;      ///< in the order of the names that were asked for
+  std::vector<double> rates;    ///< as stated; empty without such a function
+  std::vector<double> forces;   ///< empty without such a function, or where they were not asked for
+  std::vector<double> outputs;  ///< in the order of FormInfo::outputs
+};
+
+/// Values of an argument: a number, a vector or a matrix (rows × columns, by rows).
+struct Argument {
+  int rows = 0, columns = 0;  ///< 0, 0: a number; n, 0: a vector
+  std::vector<double> values;
+};
+using ArgumentRow = std::map<std::string, Argument>;
+
+/// The functions of one file. Not for two threads at once: see mutex().
+class Equations {
+ public:
+  virtual ~Equations() = default;
+
+  /// Reads the file and what it declares; the first call counts.
+  [[nodiscard]] virtual EquationResult<EquationsInfo> Load() = 0;
+  /// What functions get as parameters from now on.
+  [[nodiscard]] virtual std::optional<EquationFailure> SetParameters(
+      const std::map<std::string, double>& parameters) = 0;
+  /// Of them, those that were read since they were set.
+  [[nodiscard]] virtual std::vector<std::string> ReadParameters() = 0;
+  /// What a form states about the mechanism: "crank.mass" and the like; NaN: of no influence.
+  [[nodiscard]] virtual EquationResult<std::map<std::string, std::vector<double>>> Covers(
+      size_t form) = 0;
+  /// `q`, `v`, `a`: of the form's commands. `drives`: names, in the order that the sample has.
+  [[nodiscard]] virtual EquationResult<FormSample> Sample(size_t form, const VecX& q, const VecX& v,
+                                                          const VecX& a,
+                                                          const std::vector<LoadSample>& loads,
+                                                          const std::vector<std::string>& bodies,
+                                                          const std::vector<std::string>& drives,
+                                                          bool with_forces) = 0;
+  /// What an equation gives at many states, a row each.
+  [[nodiscard]] virtual EquationResult<std::vector<std::vector<double>>> Evaluate(
+      size_t equation, const std::vector<ArgumentRow>& rows, bool corrected) = 0;
+  /// The same of an edited text of the file.
+  [[nodiscard]] virtual EquationResult<std::vector<std::vector<double>>> EvaluateEdited(
+      const std::string& text, size_t equation, const std::vector<ArgumentRow>& rows,
+      bool corrected) = 0;
+  /// Whether a file of this kind runs as a program: then `command` is what runs.
+  [[nodiscard]] virtual std::vector<std::string> Command() const { return {}; }
+
+  /// To be held by who calls while other threads may.
+  [[nodiscard]] std::mutex& mutex() { return mutex_; }
+
+ private:
+  std::mutex mutex_;
+};
+
+/// Whether a file's equations run as a program, by its name; and the words that start it.
+[[nodiscard]] bool IsEquationProgram(const std::string& file);
+[[nodiscard]] std::vector<std::string> EquationCommand(const std::string& file);
+
+/// The functions of a file: one object for one content, kept by this process. Null after a finding.
+[[nodiscard]] std::shared_ptr<Equations> OpenEquations(const std::string& file,
+                                                       Diagnostics* diagnostics);
+
+/// The interpreters' sides as they are compiled in: equations.py; names and texts of Octave's.
+[[nodiscard]] std::string EquationsPythonText();
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> EquationsOctaveFiles();
+
+}  // namespace mbv
