@@ -86,6 +86,10 @@ const char* ToText(AuditVerdict verdict) {
       return "NOT CONFIRMED";
     case AuditVerdict::kNotTestable:
       return "no residual";
+    case AuditVerdict::kNearly:
+      return "right to a few digits";
+    case AuditVerdict::kWrongAsGiven:
+      return "wrong";
   }
   return "?";
 }

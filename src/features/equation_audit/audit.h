@@ -16,6 +16,8 @@ enum class AuditVerdict {
   kWrong,            ///< as printed: wrong; the corrected form is right
   kApproximation,    ///< as printed: as near to the exact form as an approximation is said to be
   kWrongAndUnfixed,  ///< the corrected form misses its limit too: a defect of ours
+  kNearly,           ///< of a file: right to a few digits, and not said to be an approximation
+  kWrongAsGiven,     ///< of a file: wrong, and no correction is given
   kNotTestable,      ///< a label, a choice or a claim that no residual measures; the note says why
 };
 
@@ -34,7 +36,9 @@ struct AuditRow {
   double limit = 0.0;  ///< residual_corrected must stay at or below this (derived, see note)
   std::string unit{};
   AuditVerdict verdict = AuditVerdict::kWrongAndUnfixed;
-  std::string note{};  ///< what it was compared with, and what the difference means
+  std::string note{};                ///< what it was compared with, and what the difference means
+  double digits = 0.0;               ///< right digits of the print
+  std::vector<std::string> slips{};  ///< what would make it right, the simplest first
 };
 
 /// The verdict that the numbers of a row give: kOk or kWrong when the corrected form is within its
@@ -45,7 +49,8 @@ struct AuditRow {
 struct AuditTable {
   std::string mechanism;
   std::string source;  ///< the paper
-  std::vector<AuditRow> rows;
+  std::vector<AuditRow> rows{};
+  bool of_file = false;  ///< of a user's file of equations
 };
 
 /// Computes a mechanism's table. `models_dir` holds <mechanism>/model.yaml.

@@ -1,0 +1,58 @@
+// The usual slips of printed equations, searched where one is wrong.
+//
+// Two kinds: what turns the numbers that an equation gives into the right ones (a sign, a factor,
+// exchanged or transposed elements, a missing term that is a known one), and what turns its text
+// into a right one (a sign, sine for cosine, exchanged indices, a factor, a square, a transposed
+// matrix, degrees, a term too much). A text is edited at one place, evaluated anew at all states,
+// and named only where it is right at all of them.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace mbv {
+
+/// What an equation gave and should have given at many states, a row each.
+using AuditValues = std::vector<std::vector<double>>;
+
+/// A term that may be missing: of the same shape as what the equation gives.
+struct KnownTerm {
+  std::string name;  ///< "the weight of platform"
+  AuditValues values;
+};
+
+struct SlipSearch {
+  AuditValues printed, truth;
+  double limit = 0.0;  ///< largest |difference| of a right one
+  int columns = 0;     ///< of a matrix; 0: numbers or a vector
+  std::vector<KnownTerm> terms = {};
+
+  std::string text = {};                ///< the whole file
+  int line = 0, end = 0;                ///< of the equation in it, from 1
+  std::string language = {};            ///< its extension: ".py", ".m", ".yaml"
+  std::vector<std::string> names = {};  ///< of parameters, which may be exchanged
+  /// What an edited file gives; at a few states first (`few`), else at all. Empty where it fails.
+  std::function<std::optional<AuditValues>(const std::string& text, bool few)> evaluate = {};
+  size_t few = 3;  ///< states of it
+};
+
+struct Slip {
+  std::string what;    ///< "line 12: '+' where '-' is printed"
+  std::string edited;  ///< the line as it is right; "" of numbers
+};
+
+/// What makes it right, the simplest first; at most `most`.
+[[nodiscard]] std::vector<Slip> FindSlips(const SlipSearch& search, size_t most = 5);
+
+/// Edits of a text that FindSlips() tries: what, and the whole text.
+struct TextEdit {
+  std::string what;
+  int line = 0;
+  std::string text;        ///< the file with it
+  bool of_factor = false;  ///< the sign of a factor
+};
+[[nodiscard]] std::vector<TextEdit> EditsOf(const SlipSearch& search);
+
+}  // namespace mbv
