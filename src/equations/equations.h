@@ -38,12 +38,13 @@ struct FormInfo {
 struct EquationInfo {
   std::string number;                        ///< "(14)"
   std::string gives;                         ///< the quantity that it claims to be
-  std::vector<std::string> arguments;        ///< of the function, without the parameters
+  std::vector<std::string> arguments;        ///< also of the corrected form; without parameters
   std::map<std::string, std::string> given;  ///< the quantity that an argument is
   std::map<std::string, std::vector<std::string>> each;  ///< values of indices
   std::string printed, corrected, note, unit;            ///< to read
   double approximation = 0.0;  ///< how far it may be off as printed, in its unit
   int line = 0, end = 0;       ///< of the function as printed in the file
+  int corrected_line = 0, corrected_end = 0;
   bool has_corrected = false;
 };
 
@@ -108,7 +109,9 @@ struct FormSample {
 /// Values of an argument: a number, a vector or a matrix (rows × columns, by rows).
 struct Argument {
   int rows = 0, columns = 0;  ///< 0, 0: a number; n, 0: a vector
-  std::vector<double> values;
+  bool whole = false;         ///< an index: a whole number
+  std::string text = {};      ///< an index that is none: a word
+  std::vector<double> values = {};
 };
 using ArgumentRow = std::map<std::string, Argument>;
 

@@ -805,6 +805,7 @@ class _Host:
     def __init__(self, path):
         self.path = os.path.abspath(path)
         self.parameters = _Parameters({})
+        self.module = None
 
     def load(self, source=None):
         """Runs the file, or other text in its place."""
@@ -815,6 +816,7 @@ class _Host:
         module = types.ModuleType("equations_of_a_file")
         module.__file__ = self.path
         sys.modules[module.__name__] = module
+        self.module = module
         exec(compile(source, self.path, "exec"), module.__dict__)
         return {
             "forms": [
@@ -837,7 +839,11 @@ class _Host:
                     "gives": entry.gives,
                     "line": entry.function.__code__.co_firstlineno,
                     "end": _last_line(entry.function),
-                    "arguments": _arguments(entry.function)[1:],
+                    "corrected_line": entry.right.__code__.co_firstlineno if entry.right else 0,
+                    "corrected_end": _last_line(entry.right) if entry.right else 0,
+                    "arguments": list(dict.fromkeys(
+                        name for function in (entry.function, entry.right) if function
+                        for name in _arguments(function)[1:])),
                     "has_corrected": entry.right is not None,
                     **entry.options,
                 }
@@ -911,28 +917,47 @@ class _Host:
             ]
         return answer
 
-    def equation(self, index, rows, corrected=False):
-        """One equation at many states: what it gave at each."""
+    def equation(self, index, rows, corrected=False, known=None):
+        """One equation at many states: what it gave at each. `known`: where to put all that rows
+        have."""
         entry = _declared.equations[index]
         function = entry.right if corrected else entry.function
         names = _arguments(function)[1:]
         values = []
         for row in rows:
+            if known is not None:
+                known.update((name, _shaped(x)) for name, x in row.items())
             arguments = [_shaped(row[name]) for name in names]
             values.append([numbers[0] for numbers in _numbers(function(self.parameters, *arguments))])
         return {"rows": values}
 
     def try_source(self, source, index, rows, corrected=False):
-        """The same of an edited text; errors are part of the answer."""
+        """The same of a text that is edited inside of this equation alone; errors are part of the
+        answer. The file stays as it was loaded."""
+        entry = _declared.equations[index]
+        function, right = entry.function, entry.right
+        edited = right if corrected else function
+        first = edited.__code__.co_firstlineno
+        lines = source.split("\n")[first - 1 : _last_line(edited)]
+        count = len(_declared.equations)
         try:
-            self.load(source)
-            return self.equation(index, rows, corrected)
+            # The function alone, in the file's names, at its own lines. It may name whatever this
+            # module has, and all that is known of the state.
+            names = {name: globals()[name] for name in __all__}
+            names.update(self.module.__dict__)
+            code = compile("\n" * (first - 1) + "\n".join(lines), self.path, "exec")
+            exec(code, names)
+            if not corrected:
+                _declared.equations[index] = _declared.equations.pop()
+            return self.equation(index, rows, corrected, names)
         except BaseException as error:  # an edited text may do anything
-            if isinstance(error, (KeyboardInterrupt, SystemExit)):
+            if isinstance(error, KeyboardInterrupt):
                 raise
             return {"failed": f"{type(error).__name__}: {error}"}
         finally:
-            self.load()
+            del _declared.equations[count:]
+            _declared.equations[index] = entry
+            entry.right = right
 
 
 def _last_line(function):

@@ -93,9 +93,7 @@ class FileClosedForm final : public ClosedForm {
     }
   }
 
-  [[nodiscard]] std::vector<Channel> extra_channels() const override {
-    return channels_;
-  }
+  [[nodiscard]] std::vector<Channel> extra_channels() const override { return channels_; }
 
   [[nodiscard]] RunSummary Kinematics(const CommandSample& command, DrivenSample* driven) override {
     return At(command, false, driven, nullptr);

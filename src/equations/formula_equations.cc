@@ -383,6 +383,9 @@ class FormulaEquations final : public Equations {
                             .node = map.Find("corrected")};
       if (equation.printed.node == nullptr) continue;
       equation.info.line = equation.info.end = equation.printed.node->line;
+      if (equation.corrected.node != nullptr) {
+        equation.info.corrected_line = equation.info.corrected_end = equation.corrected.node->line;
+      }
       for (const std::string& coordinate : states_.coordinates) {
         for (const char* suffix : {"", "_d", "_dd"}) {
           const std::string name = ShortName(coordinate) + suffix;

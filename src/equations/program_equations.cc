@@ -27,6 +27,8 @@ Json Array(const VecX& values) { return Json(std::vector<double>(values.begin(),
 Json Array(const Vec3& values) { return Json{values[0], values[1], values[2]}; }
 
 Json AsJson(const Argument& argument) {
+  if (!argument.text.empty()) return Json(argument.text);
+  if (argument.whole) return Json(static_cast<long>(argument.values.at(0)));
   if (argument.rows == 0) return Json(argument.values.at(0));
   if (argument.columns == 0) return Json(argument.values);
   Json rows = Json::array();
@@ -91,6 +93,8 @@ EquationInfo ReadEquation(const JsonValue& json) {
   equation.approximation = json.value("approximation", 0.0);
   equation.line = json.value("line", 0);
   equation.end = json.value("end", 0);
+  equation.corrected_line = json.value("corrected_line", 0);
+  equation.corrected_end = json.value("corrected_end", 0);
   equation.has_corrected = json.at("has_corrected");
   return equation;
 }

@@ -376,13 +376,6 @@ class FileAudit {
             text.empty() ? std::nullopt : Quantity(equation, Filled(text, indices));
         if (quantity) arguments.emplace_back(argument, *quantity);
       }
-      for (const auto& [name, text] : equation.given) {
-        if (Contains(equation.arguments, name) || is_formula_) continue;
-        Error(equation.line,
-              fmt::format("{}: given names '{}', which is none of its arguments", equation.number,
-                          name),
-              DidYouMean(name, equation.arguments));
-      }
       if (diagnostics_->has_errors()) return {};
       for (size_t k = 0; k < states_.size(); ++k) {
         ArgumentRow row;
@@ -391,14 +384,9 @@ class FileAudit {
         for (const auto& [name, value] : indices) {
           if (!Contains(equation.arguments, name)) continue;
           const auto number = ParsedNumber(value);
-          if (!number) {
-            Error(equation.line,
-                  fmt::format("{}: the index {} = '{}' is no number", equation.number, name,
-                              QuotedValue(value)),
-                  "indices that are texts stand in gives and given only");
-            return {};
-          }
-          row[name] = {.rows = 0, .columns = 0, .values = {*number}};
+          row[name] = number
+                          ? Argument{.whole = *number == std::floor(*number), .values = {*number}}
+                          : Argument{.text = value};
         }
         const Argument truth = gives->At(states_[k]);
         made.columns = truth.columns;
@@ -485,7 +473,7 @@ class FileAudit {
     if (equation.has_corrected && row.corrected.empty()) row.corrected = "as corrected in the file";
     row.approximation = equation.approximation;
     auto printed = equations_->Evaluate(index, made->rows, false);
-    if (printed && !SizesFit(equation, *printed.value, made->truth)) return {};
+    if (printed && !SizesFit(equation, *printed.value, &*made)) return {};
     std::optional<AuditValues> corrected;
     if (equation.has_corrected) {
       auto values = equations_->Evaluate(index, made->rows, true);
@@ -493,13 +481,16 @@ class FileAudit {
         (void)Refused(values.failure);
         return {};
       }
-      if (!SizesFit(equation, *values.value, made->truth)) return {};
+      if (!SizesFit(equation, *values.value, &*made)) return {};
       corrected = std::move(*values.value);
     } else if (!printed) {
       (void)Refused(printed.failure);
       return {};
     }
-    const double terms = SizeOfTerms(index, *made, corrected.has_value());
+    double terms = SizeOfTerms(index, *made, corrected.has_value());
+    if (made->vanishes) {
+      terms = std::max(terms, SizeBySigns(index, *made, corrected.has_value()));
+    }
     Judge(equation, *made, printed ? &*printed.value : nullptr, corrected ? &*corrected : nullptr,
           terms, &row);
     if (!printed) {
@@ -514,8 +505,11 @@ class FileAudit {
     return row;
   }
 
-  bool SizesFit(const EquationInfo& equation, const AuditValues& values, const AuditValues& truth) {
+  bool SizesFit(const EquationInfo& equation, const AuditValues& values, Case* made) {
+    AuditValues& truth = made->truth;
     for (size_t k = 0; k < values.size() && k < truth.size(); ++k) {
+      // So many numbers as there are must vanish.
+      if (made->vanishes) truth[k].assign(std::max<size_t>(values[k].size(), 1), 0.0);
       if (values[k].size() == truth[k].size()) continue;
       Error(equation.line, fmt::format("{}: gives {} numbers, and {} has {}", equation.number,
                                        values[k].size(), equation.gives, truth[k].size()));
@@ -556,6 +550,29 @@ class FileAudit {
       }
     }
     return largest / kNudge;
+  }
+
+  // The same where the terms cancel whatever the arguments are: by how much it changes with the
+  // signs in its text.
+  double SizeBySigns(size_t index, const Case& made, bool corrected) {
+    const EquationInfo& equation = info_.equations[index];
+    SlipSearch search{.printed = {}, .truth = made.truth};
+    search.text = text_;
+    search.line = corrected ? equation.corrected_line : equation.line;
+    search.end = corrected ? equation.corrected_end : equation.end;
+    search.language = fs::path(file_).extension().string();
+    double largest = 0.0;
+    for (const TextEdit& edit : EditsOf(search)) {
+      if (edit.kind != TextEdit::Kind::kSign) continue;
+      const auto values = equations_->EvaluateEdited(edit.In(text_), index, made.rows, corrected);
+      if (!values) continue;
+      for (const auto& row : *values.value) {
+        for (const double value : row) {
+          if (std::abs(value) > largest) largest = std::abs(value);
+        }
+      }
+    }
+    return largest;
   }
 
   void Judge(const EquationInfo& equation, const Case& made, const AuditValues* printed,
@@ -615,8 +632,15 @@ class FileAudit {
     search.end = equation.end;
     search.language = fs::path(file_).extension().string();
     search.names = parameter_names_;
-    for (const auto& [name, quantity] : usual_) {
-      if (is_formula_) search.names.push_back(name);
+    if (!made.rows.empty()) {
+      for (const auto& [name, argument] : made.rows.front()) {
+        // The quantity itself would make anything right.
+        bool itself = true;
+        for (size_t k = 0; k < made.rows.size(); ++k) {
+          itself = itself && made.rows[k].at(name).values == made.truth[k];
+        }
+        if (!itself) search.arguments.push_back(name);
+      }
     }
     const std::vector<ArgumentRow> few(
         made.rows.begin(),

@@ -21,8 +21,9 @@ class QuantityParser {
 
   std::optional<AuditQuantity> Run() {
     std::string text = text_;
-    if (!TakeSuffix(" from ", &text, &q_.from_) || !TakeSuffix(" in ", &text, &q_.in_) ||
-        !TakeSuffix(" from ", &text, &q_.from_) || !TakeElement(&text)) {
+    if (!TakeElement(&text) || !TakeSuffix(" from ", &text, &q_.from_) ||
+        !TakeSuffix(" in ", &text, &q_.in_) || !TakeSuffix(" from ", &text, &q_.from_) ||
+        !TakeElement(&text)) {
       return {};
     }
     if (Whole(text) || OfCoordinate(text) || OfDrive(text) || OfJoint(text) || OfBody(text)) {
@@ -44,6 +45,8 @@ class QuantityParser {
     const size_t at = text->rfind(word);
     if (at == std::string::npos) return true;
     const std::string name = text->substr(at + word.size());
+    // The other word may stand behind it: that is taken first.
+    if (name.find(' ') != std::string::npos) return true;
     *body = mechanism_.FindBody(name);
     if (*body < 0) {
       *hint_ = DidYouMean(name, NamesOf(mechanism_.bodies));
@@ -332,7 +335,7 @@ Argument AuditQuantity::At(const AuditState& state) const {
   if (element_) {
     const Eigen::Index k = column_ < 0 ? 0 : column_;
     const bool there = row_ < whole.rows() && k < whole.cols();
-    return {.rows = 0, .columns = 0, .values = {there ? whole(row_, k) : kNan}};
+    return {.values = {there ? whole(row_, k) : kNan}};
   }
   const bool scalar = whole.size() == 1 && kind_ != Kind::kMass && kind_ != Kind::kBias &&
                       kind_ != Kind::kGravity && kind_ != Kind::kDriveJacobian;

@@ -225,7 +225,11 @@ class Editor {
       if (token.kind == Token::Kind::kName) Names(t);
     }
     for (size_t t = 0; t < tokens_.size(); ++t) Factors(t);
-    for (size_t t = 0; t < tokens_.size(); ++t) Terms(t);
+    for (size_t t = 0; t < tokens_.size(); ++t) {
+      Terms(t);
+      Brackets(t);
+      Products(t);
+    }
     return std::move(edits_);
   }
 
@@ -334,9 +338,9 @@ class Editor {
     }
   }
 
-  void Add(std::string what, int line, size_t at, size_t size, const std::string& with) {
-    std::string text = text_.substr(0, at) + with + text_.substr(at + size);
-    edits_.push_back({fmt::format("line {}: {}", line, what), line, std::move(text)});
+  void Add(const std::string& what, int line, size_t at, size_t size, const std::string& with,
+           TextEdit::Kind kind = TextEdit::Kind::kOther) {
+    edits_.push_back({kind, fmt::format("line {}: {}", line, what), line, at, size, with});
   }
 
   [[nodiscard]] bool IsValue(size_t t) const {
@@ -371,9 +375,12 @@ class Editor {
     const Token& token = tokens_[t];
     const bool binary = t > 0 && IsValue(t - 1) && !IsKeyword(Word(tokens_[t - 1]));
     const char* other = text_[token.at] == '+' ? "-" : "+";
-    Add(fmt::format("'{}' for '{}' in front of '{}'", other, text_[token.at],
-                    t + 1 < tokens_.size() ? Around(tokens_[t + 1]) : ""),
-        token.line, token.at, 1, binary || *other == '-' ? other : " ");
+    const std::string before = t + 1 < tokens_.size() ? Around(tokens_[t + 1]) : "";
+    Add(fmt::format("'{}' for '{}' in front of '{}'", other, text_[token.at], before), token.line,
+        token.at, 1, binary || *other == '-' ? other : " ", TextEdit::Kind::kSign);
+    if (!binary) return;
+    Add(fmt::format("'*' for '{}' in front of '{}'", text_[token.at], before), token.line, token.at,
+        1, "*");
   }
 
   // Functions and names that look alike.
@@ -406,7 +413,7 @@ class Editor {
     }
     for (const std::string& other : others) {
       Add(fmt::format("'{}' for '{}' in '{}'", other, word, Around(token)), token.line, token.at,
-          token.size, other);
+          token.size, other, TextEdit::Kind::kName);
     }
   }
 
@@ -416,6 +423,7 @@ class Editor {
     const bool attribute = IsAttribute(t);
     const bool parameter = attribute ? t > 1 && IsWord(t - 2, "p") : !python_ && !octave_;
     if (parameter) names.insert(s_.names.begin(), s_.names.end());
+    if (!attribute) names.insert(s_.arguments.begin(), s_.arguments.end());
     for (size_t k = 0; k < tokens_.size(); ++k) {
       if (tokens_[k].kind != Kind::kName || IsAttribute(k) != attribute || IsCalled(k)) continue;
       if (!IsKeyword(Word(tokens_[k]))) names.insert(Word(tokens_[k]));
@@ -428,7 +436,7 @@ class Editor {
   static bool LooksAlike(const std::string& a, const std::string& b) {
     if (a == b) return false;
     // A rate for an acceleration.
-    if (a == b + "d" || b == a + "d") return true;
+    if (a == b + "d" || b == a + "d" || a == b + "_d" || b == a + "_d") return true;
     const size_t i = a.find('_'), k = b.find('_');
     if (i != std::string::npos && k != std::string::npos &&
         (a.substr(0, i) == b.substr(0, k) || a.substr(i) == b.substr(k))) {
@@ -497,7 +505,7 @@ class Editor {
       Add(fmt::format("'{}' {}", OneLine(value), what), first.line, first.at, size, with);
     };
     add("with the other sign", "(-" + value + ")");
-    edits_.back().of_factor = true;
+    edits_.back().kind = TextEdit::Kind::kFactorSign;
     add("times 1/2", "(0.5*" + value + ")");
     add("times 2", "(2*" + value + ")");
     add("squared", "(" + value + power + "2)");
@@ -531,6 +539,54 @@ class Editor {
             tokens_[*last + 1].at + 1 - first.at, "");
       }
     }
+  }
+
+  // A factor that belongs to a part of the sum in front of it: (A + B) C for A + B C.
+  void Brackets(size_t t) {
+    if (!IsWord(t, "(") || (t > 0 && IsValue(t - 1) && Touches(t - 1))) return;
+    const auto close = Closing(t);
+    if (!close || *close + 2 >= tokens_.size()) return;
+    const bool product = IsWord(*close + 1, "*") || IsWord(*close + 1, "@");
+    const auto last = product ? EndOfValue(*close + 2) : std::nullopt;
+    if (!last) return;
+    const size_t open = tokens_[t].at, end = tokens_[*last].at + tokens_[*last].size;
+    const std::string factor =
+        text_.substr(tokens_[*close].at + 1, end - tokens_[*close].at - 1);  // "* C"
+    for (size_t k = t + 2; k < *close; ++k) {
+      const Token& sign = tokens_[k];
+      if (sign.kind != Kind::kSign || sign.depth != tokens_[t].depth + 1 || !IsValue(k - 1)) {
+        continue;
+      }
+      const std::string left = text_.substr(open + 1, sign.at - open - 1);
+      const std::string right = text_.substr(sign.at + 1, tokens_[*close].at - sign.at - 1);
+      const std::string word(1, text_[sign.at]);
+      const std::string of = OneLine(factor);
+      // The minus of a sum belongs to its first term alone.
+      if (word == "+") {
+        Add(fmt::format("'{}' behind '{}' alone", of, OneLine(right)), sign.line, open, end - open,
+            "(" + left + word + " (" + right + ")" + factor + ")");
+      }
+      Add(fmt::format("'{}' behind '{}' alone", of, OneLine(left)), sign.line, open, end - open,
+          "((" + left + ")" + factor + word + right + ")");
+    }
+  }
+
+  // Factors in the other order, and a matrix for its inverse.
+  void Products(size_t t) {
+    if (IsAttribute(t) || !python_) return;
+    const auto end = EndOfValue(t);
+    if (!end || *end + 2 >= tokens_.size() || !IsWord(*end + 1, "@")) return;
+    const auto last = EndOfValue(*end + 2);
+    if (!last) return;
+    const size_t at = tokens_[t].at, middle = tokens_[*end + 2].at;
+    const size_t size = tokens_[*last].at + tokens_[*last].size - at;
+    const std::string left = text_.substr(at, tokens_[*end].at + tokens_[*end].size - at);
+    const std::string right = text_.substr(middle, at + size - middle);
+    const int line = tokens_[t].line;
+    Add(fmt::format("'{}' and '{}' in the other order", OneLine(left), OneLine(right)), line, at,
+        size, "(" + right + " @ " + left + ")");
+    Add(fmt::format("the inverse of '{}'", OneLine(left)), line, at, size,
+        "linear_solve(" + left + ", " + right + ")");
   }
 
   // A term of a sum that is too much.
@@ -580,6 +636,91 @@ AuditValues Head(const AuditValues& all, size_t count) {
   return {all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min(count, all.size()))};
 }
 
+// Of the text: one edit, one edit with a factor of the whole, two edits of signs and names.
+class TextSlips {
+ public:
+  TextSlips(const SlipSearch& search, size_t most) : s_(search), most_(most) {}
+
+  void Try(std::vector<Slip>* found) {
+    const std::vector<TextEdit> edits = EditsOf(s_);
+    std::set<std::string> tried;
+    for (const TextEdit& edit : edits) {
+      if (found->size() >= most_) return;
+      const std::string text = edit.In(s_.text);
+      if (!tried.insert(text).second) continue;
+      // A sign that was found in front of a term is not found again in each of its factors.
+      if (edit.kind == TextEdit::Kind::kFactorSign && !found->empty()) continue;
+      if (TryOne(text)) {
+        found->push_back({edit.what, LineOf(text, edit.line)});
+      } else if (with_factor_.empty()) {
+        TryFactor(edit, text);
+      }
+    }
+    if (found->empty() && with_factor_.empty()) TryPairs(edits, found);
+  }
+
+  [[nodiscard]] std::vector<Slip> with_factor() const { return with_factor_; }
+
+ private:
+  static constexpr size_t kMostPairs = 1000;
+
+  // Right at few states, then at all. What it gave at few stays in `few_`.
+  bool TryOne(const std::string& text) {
+    few_ = s_.evaluate(text, true);
+    if (!few_ || !IsRight(*few_, s_.truth, s_.limit)) return false;
+    const auto all = s_.evaluate(text, false);
+    return all && all->size() == s_.truth.size() && IsRight(*all, s_.truth, s_.limit);
+  }
+
+  void TryFactor(const TextEdit& edit, const std::string& text) {
+    const AuditValues truth = few_ ? Head(s_.truth, few_->size()) : AuditValues{};
+    if (!few_ || !SameShape(*few_, truth)) return;
+    for (const Factor& factor : kFactors) {
+      const auto times = [&](const AuditValues& values) {
+        return [&values, &factor](size_t row, size_t k) { return factor.value * values[row][k]; };
+      };
+      if (!(Difference(*few_, truth, times(*few_)) <= s_.limit)) continue;
+      const auto all = s_.evaluate(text, false);
+      if (!all || !SameShape(*all, s_.truth)) continue;
+      if (!(Difference(*all, s_.truth, times(*all)) <= s_.limit)) continue;
+      with_factor_.push_back({fmt::format("{}, and the whole times {}", edit.what, factor.text),
+                              LineOf(text, edit.line)});
+      return;
+    }
+  }
+
+  void TryPairs(const std::vector<TextEdit>& edits, std::vector<Slip>* found) {
+    std::vector<const TextEdit*> simple;
+    for (const TextEdit& edit : edits) {
+      if (edit.kind == TextEdit::Kind::kSign || edit.kind == TextEdit::Kind::kName) {
+        simple.push_back(&edit);
+      }
+    }
+    size_t pairs = 0;
+    for (size_t i = 0; i < simple.size(); ++i) {
+      for (size_t k = i + 1; k < simple.size(); ++k) {
+        const TextEdit& first = simple[i]->at < simple[k]->at ? *simple[i] : *simple[k];
+        const TextEdit& second = &first == simple[i] ? *simple[k] : *simple[i];
+        if (first.at + first.size > second.at) continue;
+        if (++pairs > kMostPairs || !found->empty()) return;
+        // The later one first: places before it stay.
+        const std::string text = first.In(second.In(s_.text));
+        if (TryOne(text)) {
+          found->push_back(
+              {fmt::format("{}, and {}", first.what, second.what),
+               LineOf(text, first.line) +
+                   (first.line == second.line ? "" : " … " + LineOf(text, second.line))});
+        }
+      }
+    }
+  }
+
+  const SlipSearch& s_;
+  size_t most_;
+  std::optional<AuditValues> few_;
+  std::vector<Slip> with_factor_;
+};
+
 }  // namespace
 
 std::vector<TextEdit> EditsOf(const SlipSearch& search) { return Editor(search).Run(); }
@@ -587,40 +728,9 @@ std::vector<TextEdit> EditsOf(const SlipSearch& search) { return Editor(search).
 std::vector<Slip> FindSlips(const SlipSearch& search, size_t most) {
   std::vector<Slip> found = NumberSlips(search).Run();
   if (search.evaluate == nullptr) return found;
-  std::set<std::string> tried;
-  std::vector<Slip> with_factor;
-  for (const TextEdit& edit : EditsOf(search)) {
-    if (found.size() >= most) break;
-    if (!tried.insert(edit.text).second) continue;
-    // A sign that was found in front of a term is not found again in each of its factors.
-    if (edit.of_factor && !found.empty()) continue;
-    const auto few = search.evaluate(edit.text, true);
-    if (!few) continue;
-    const AuditValues truth = Head(search.truth, few->size());
-    if (IsRight(*few, truth, search.limit)) {
-      const auto all = search.evaluate(edit.text, false);
-      if (all && all->size() == search.truth.size() && IsRight(*all, search.truth, search.limit)) {
-        found.push_back({edit.what, LineOf(edit.text, edit.line)});
-      }
-      continue;
-    }
-    // Together with a factor of the whole.
-    if (!with_factor.empty() || !SameShape(*few, truth)) continue;
-    for (const Factor& factor : kFactors) {
-      const double largest = Difference(
-          *few, truth, [&](size_t row, size_t k) { return factor.value * (*few)[row][k]; });
-      if (!(largest <= search.limit)) continue;
-      const auto all = search.evaluate(edit.text, false);
-      if (!all || !SameShape(*all, search.truth)) continue;
-      const double whole = Difference(
-          *all, search.truth, [&](size_t row, size_t k) { return factor.value * (*all)[row][k]; });
-      if (!(whole <= search.limit)) continue;
-      with_factor.push_back({fmt::format("{}, and the whole times {}", edit.what, factor.text),
-                             LineOf(edit.text, edit.line)});
-      break;
-    }
-  }
-  if (found.empty()) return with_factor;
+  TextSlips text(search, most);
+  text.Try(&found);
+  if (found.empty()) return text.with_factor();
   if (found.size() > most) found.resize(most);
   return found;
 }

@@ -29,10 +29,11 @@ struct SlipSearch {
   int columns = 0;     ///< of a matrix; 0: numbers or a vector
   std::vector<KnownTerm> terms = {};
 
-  std::string text = {};                ///< the whole file
-  int line = 0, end = 0;                ///< of the equation in it, from 1
-  std::string language = {};            ///< its extension: ".py", ".m", ".yaml"
-  std::vector<std::string> names = {};  ///< of parameters, which may be exchanged
+  std::string text = {};                    ///< the whole file
+  int line = 0, end = 0;                    ///< of the equation in it, from 1
+  std::string language = {};                ///< its extension: ".py", ".m", ".yaml"
+  std::vector<std::string> names = {};      ///< of parameters, which may be exchanged
+  std::vector<std::string> arguments = {};  ///< that are known of the state
   /// What an edited file gives; at a few states first (`few`), else at all. Empty where it fails.
   std::function<std::optional<AuditValues>(const std::string& text, bool few)> evaluate = {};
   size_t few = 3;  ///< states of it
@@ -46,12 +47,18 @@ struct Slip {
 /// What makes it right, the simplest first; at most `most`.
 [[nodiscard]] std::vector<Slip> FindSlips(const SlipSearch& search, size_t most = 5);
 
-/// Edits of a text that FindSlips() tries: what, and the whole text.
+/// An edit of a text that FindSlips() tries.
 struct TextEdit {
+  enum class Kind { kSign, kName, kFactorSign, kOther };
+  Kind kind = Kind::kOther;
   std::string what;
   int line = 0;
-  std::string text;        ///< the file with it
-  bool of_factor = false;  ///< the sign of a factor
+  size_t at = 0, size = 0;  ///< what it replaces
+  std::string with;
+
+  [[nodiscard]] std::string In(const std::string& text) const {
+    return text.substr(0, at) + with + text.substr(at + size);
+  }
 };
 [[nodiscard]] std::vector<TextEdit> EditsOf(const SlipSearch& search);
 
