@@ -1,0 +1,162 @@
+// Scenarios whose analytic witness is a user's file: the whole way, and consent.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "base/files.h"
+#include "features/run/run_scenario.h"
+#include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
+#include "verify/check_file.h"
+#include "verify/prepare.h"
+#include "verify/program_consent.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A four-bar whose crank is commanded; `forces` is the body of the file's function.
+class OwnEquations : public testing::Test {
+ protected:
+  OwnEquations() {
+    // Nobody trusts this folder.
+    setenv("XDG_CONFIG_HOME", folder_.PathOf("config").c_str(), 1);
+  }
+  ~OwnEquations() override { unsetenv("XDG_CONFIG_HOME"); }
+
+  std::string Write(const std::string& forces, const std::string& name = "crank.py") const {
+    folder_.Write(name, fmt::format(R"(
+from mbverify.equations import closed_form, motion, jacobian, asin, sin, cos, Vec
+open("{}", "w").write("ran")
+
+def points(p, theta):
+    phi = -asin(p.r / p.l * sin(theta))
+    pin = p.r * Vec(cos(theta), sin(theta))
+    return [pin / 2, pin + p.l / 2 * Vec(cos(phi), sin(phi)), p.r * cos(theta) + p.l * cos(phi),
+            theta, phi]
+
+@closed_form("planar_slider_crank", commands=["motor"])
+def drives(p, theta):
+    return [theta]
+
+@closed_form.forces
+def forces(p, q, qd, qdd):
+    f = lambda theta: points(p, theta)
+    crank, rod, slider, theta, phi = motion(f, q, qd, qdd)[2]
+    weights = [p.m_crank] * 2 + [p.m_rod] * 2 + [p.m_slider, p.I_crank, p.I_rod]
+    a = [crank[0], crank[1] + p.g, rod[0], rod[1] + p.g, slider, theta, phi]
+    torque = sum(w * x * J[0] for w, x, J in zip(weights, a, jacobian(f, q)))
+    {}
+)",
+                                    Marker(), forces));
+    return folder_.Write(
+        "turn.yaml",
+        fmt::format(R"(
+mechanism: {}
+analytic: {{equations: {}}}
+motion: {{duration_s: 0.5, sample_s: 0.01, commands: {{motor: [home, {{ramp: {{rate: 3}}}}]}}}}
+simulation: {{mode: inverse}}
+)",
+                    SourcePath("/examples/closed_form/models/planar_slider_crank/model.yaml"),
+                    name));
+  }
+  [[nodiscard]] std::string Marker() const { return folder_.PathOf("marker"); }
+  [[nodiscard]] bool ran() const { return fs::exists(Marker()); }
+
+  static RunOutcome Run(const std::string& file, bool trusted = true) {
+    RunOptions options;
+    options.programs.all = trusted;
+    return RunScenario(file, options);
+  }
+
+  test::TestFolder folder_{"own_equations"};
+};
+
+TEST_F(OwnEquations, DriveTheSimulationAndEnterTheVerdict) {
+  const RunOutcome outcome = Run(Write("return [torque]"));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  const Comparison& comparison = outcome.report->comparison;
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree) << comparison.reason;
+  EXPECT_EQ(outcome.report->driven_by, "analytic");
+  const PairComparison* pair = comparison.FindPair("reference_vs_analytic");
+  ASSERT_NE(pair, nullptr);
+  EXPECT_LT(pair->metrics.at(Metric::kForceNrmse).value, 1e-12);
+  ASSERT_EQ(comparison.caveats.size(), 1u);
+  EXPECT_EQ(comparison.caveats[0].kind, CaveatKind::kCoverage);
+}
+
+TEST_F(OwnEquations, AreNamedWhereTheyAreWrong) {
+  const RunOutcome outcome = Run(Write("return [1.00001 * torque]"));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kDisagree);
+  EXPECT_EQ(outcome.report->comparison.attribution.odd_one_out, "analytic")
+      << outcome.report->comparison.attribution.text;
+}
+
+TEST_F(OwnEquations, EndTheRunWhereTheyEnd) {
+  const RunOutcome outcome =
+      Run(Write("return [torque] if q.theta < 1.5 else [torque / (q.theta - q.theta)]"));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kNotRun);
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.report->comparison.reason.find("crank.py:"), std::string::npos)
+      << outcome.report->comparison.reason;
+}
+
+TEST_F(OwnEquations, RunAfterConsentOnly) {
+  const std::string file = Write("return [torque]");
+  const RunOutcome refused = Run(file, false);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_FALSE(refused.report);
+  EXPECT_NE(refused.diagnostics.Text().find("its programs may not run as you: analytic:"),
+            std::string::npos)
+      << refused.diagnostics.Text();
+  EXPECT_FALSE(ran());
+  // What asks nobody goes on without them.
+  Diagnostics diagnostics;
+  const auto prepared = Prepare(file, {}, &diagnostics);
+  ASSERT_TRUE(prepared) << diagnostics.Text();
+  EXPECT_FALSE(prepared->has_closed_form());
+  EXPECT_EQ(prepared->closed_form.gap, WitnessGap::kNotApplicable);
+  EXPECT_NE(diagnostics.Text().find("may not run as you"), std::string::npos);
+  EXPECT_FALSE(ran());
+  // Checking runs nothing, even what is trusted.
+  ASSERT_EQ(TrustFolder(folder_.PathOf(""), true), "");
+  EXPECT_FALSE(CheckScenario(file).has_errors()) << CheckScenario(file).Text();
+  EXPECT_FALSE(ran());
+  EXPECT_EQ(ProgramsOf(file, {}).Lines().size(), 1u);
+  EXPECT_EQ(Run(file, false).exit_code, 0);
+  EXPECT_TRUE(ran());
+}
+
+// Formulas are no program.
+TEST_F(OwnEquations, NeedNoConsentAsFormulas) {
+  folder_.Write("crank.yaml",
+                "mechanism: planar_slider_crank\ncommands: [motor]\ndrives: {motor: motor}\n"
+                "forces: {motor: 0}\ncovers: unchecked\n");
+  const std::string file = Write("", "crank.py");
+  const std::string text = ReadWholeFile(file).value();
+  std::string other = text;
+  other.replace(other.find("crank.py"), 8, "crank.yaml");
+  folder_.Write("turn.yaml", other);
+  EXPECT_TRUE(ProgramsOf(file, {}).programs.empty());
+  const RunOutcome outcome = Run(file, false);
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kDisagree);
+}
+
+TEST_F(OwnEquations, AreLookedForBesideScenarioAndModel) {
+  const std::string file = Write("return [torque]");
+  fs::remove(folder_.PathOf("crank.py"));
+  const RunOutcome outcome = Run(file);
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_NE(outcome.diagnostics.Text().find("analytic.equations = 'crank.py': there is no such"),
+            std::string::npos)
+      << outcome.diagnostics.Text();
+}
+
+}  // namespace
+}  // namespace mbv
