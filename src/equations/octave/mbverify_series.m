@@ -1,0 +1,962 @@
+classdef mbverify_series
+  % a + b t + c t^2: arrays that carry their first two derivatives by one variable. The coefficients
+  % a, b, c have one size; they may be series of another variable (of a lower level).
+  %
+  % Operators and functions are those of numbers, element by element or of matrices. Comparisons are
+  % those of the values; mbverify_value(x) gives the values. Real functions stay real: a root,
+  % logarithm or arc of a number that has none ends the computation.
+  properties
+    a
+    b
+    c
+    level
+  end
+
+  methods
+    function s = mbverify_series(a, b, c, level)
+      s.a = a;
+      s.b = b;
+      s.c = c;
+      s.level = level;
+    end
+
+    % Sums and products.
+
+    function s = plus(x, y)
+      if (isobject(x) && isobject(y) && x.level == y.level)
+        s = x;
+        s.a = x.a + y.a;
+        s.b = x.b + y.b;
+        s.c = x.c + y.c;
+      elseif (is_above(x, y))
+        s = shifted(x, y);
+      else
+        s = shifted(y, x);
+      end
+    end
+
+    function s = minus(x, y)
+      if (isobject(x) && isobject(y) && x.level == y.level)
+        s = x;
+        s.a = x.a - y.a;
+        s.b = x.b - y.b;
+        s.c = x.c - y.c;
+      elseif (is_above(x, y))
+        s = shifted(x, -y);
+      else
+        s = shifted(-y, x);
+      end
+    end
+
+    function s = uminus(x)
+      s = x;
+      s.a = -x.a;
+      s.b = -x.b;
+      s.c = -x.c;
+    end
+
+    function s = uplus(x)
+      s = x;
+    end
+
+    function s = times(x, y)
+      if (isobject(x) && isobject(y) && x.level == y.level)
+        s = x;
+        s.a = x.a .* y.a;
+        s.b = x.a .* y.b + x.b .* y.a;
+        s.c = x.a .* y.c + x.b .* y.b + x.c .* y.a;
+      elseif (is_above(x, y))
+        s = x;
+        s.a = x.a .* y;
+        s.b = x.b .* y;
+        s.c = x.c .* y;
+      else
+        s = y;
+        s.a = x .* y.a;
+        s.b = x .* y.b;
+        s.c = x .* y.c;
+      end
+    end
+
+    function s = mtimes(x, y)
+      if (isobject(x) && isobject(y) && x.level == y.level)
+        s = x;
+        s.a = x.a * y.a;
+        s.b = x.a * y.b + x.b * y.a;
+        s.c = x.a * y.c + x.b * y.b + x.c * y.a;
+      elseif (is_above(x, y))
+        s = x;
+        s.a = x.a * y;
+        s.b = x.b * y;
+        s.c = x.c * y;
+      else
+        s = y;
+        s.a = x * y.a;
+        s.b = x * y.b;
+        s.c = x * y.c;
+      end
+    end
+
+    function s = rdivide(x, y)
+      if (is_above(x, y))
+        if (any(mbverify_value(y)(:) == 0))
+          error('mbverify:singular', 'division by zero');
+        end
+        s = x;
+        s.a = x.a ./ y;
+        s.b = x.b ./ y;
+        s.c = x.c ./ y;
+      else
+        s = x .* inverse(y);
+      end
+    end
+
+    function s = ldivide(x, y)
+      s = y ./ x;
+    end
+
+    function s = mrdivide(x, y)
+      if (numel(y) == 1)
+        s = x ./ y;
+      else
+        s = (y.' \ x.').';
+      end
+    end
+
+    function x = mldivide(A, r)
+      % Order by order with the same matrix. What has no unique solution is solved by least squares.
+      if (numel(A) == 1)
+        x = r ./ A;
+        return
+      end
+      if (size(A, 1) > size(A, 2))
+        x = (A.' * A) \ (A.' * r);
+        return
+      elseif (size(A, 1) < size(A, 2))
+        x = A.' * ((A * A.') \ r);
+        return
+      end
+      [A, r] = aligned(A, r);
+      x = r;
+      x.a = A.a \ r.a;
+      x.b = A.a \ (r.b - A.b * x.a);
+      x.c = A.a \ (r.c - A.b * x.b - A.c * x.a);
+    end
+
+    function s = power(x, n)
+      if (isobject(n))
+        s = exp(n .* log(x));
+        return
+      end
+      if (numel(n) == 1 && n == round(n) && abs(n) <= 64)
+        s = whole_power(x, n, @times);
+        return
+      end
+      if (numel(n) == 1 && n == 0.5)
+        s = sqrt(x);
+        return
+      end
+      bad = n ~= round(n) & mbverify_value(x) < 0;
+      if (any(bad(:)))
+        error('mbverify:unreachable', 'a broken power of a negative number');
+      end
+      if (any(mbverify_value(x)(:) == 0))
+        error('mbverify:singular', 'a broken power of 0 has no derivative');
+      end
+      f = x.a .^ n;
+      s = applied(x, f, n .* f ./ x.a, n .* (n - 1) .* f ./ (x.a .* x.a));
+    end
+
+    function s = mpower(x, n)
+      if (numel(x) == 1)
+        s = x .^ n;
+      elseif (~isobject(n) && numel(n) == 1 && n == round(n))
+        if (n < 0)
+          s = whole_power(inv(x), -n, @mtimes);
+        elseif (n == 0)
+          s = constant(eye(size(x, 1)), x.level);
+        else
+          s = whole_power(x, n, @mtimes);
+        end
+      else
+        error('mbverify:series', 'a matrix to a power that is no whole number');
+      end
+    end
+
+    % Functions.
+
+    function s = sqrt(x)
+      f = real_sqrt(x.a);
+      nil = mbverify_value(f) == 0;
+      if (any(nil(:)))
+        if (isobject(x.a) || any(x.b(nil) ~= 0) || any(x.c(nil) ~= 0))
+          error('mbverify:singular', 'the root of 0 has no derivative');
+        end
+        g = f;
+        g(nil) = 1;  % a constant 0 stays one
+        s = applied(x, f, 0.5 ./ g, -0.25 ./ g .^ 3);
+      else
+        s = applied(x, f, 0.5 ./ f, -0.25 ./ (x.a .* f));
+      end
+    end
+
+    function s = realsqrt(x)
+      s = sqrt(x);
+    end
+
+    function s = exp(x)
+      f = exp(x.a);
+      s = applied(x, f, f, f);
+    end
+
+    function s = log(x)
+      r = 1 ./ x.a;
+      s = applied(x, real_log(x.a), r, -r .* r);
+    end
+
+    function s = reallog(x)
+      s = log(x);
+    end
+
+    function s = realpow(x, n)
+      s = x .^ n;
+    end
+
+    function s = log10(x)
+      s = log(x) ./ 2.302585092994045684;
+    end
+
+    function s = log2(x)
+      s = log(x) ./ 0.693147180559945309;
+    end
+
+    function s = sin(x)
+      f = sin(x.a);
+      s = applied(x, f, cos(x.a), -f);
+    end
+
+    function s = cos(x)
+      f = cos(x.a);
+      s = applied(x, f, -sin(x.a), -f);
+    end
+
+    function s = tan(x)
+      f = tan(x.a);
+      g = 1 + f .* f;
+      s = applied(x, f, g, 2 .* f .* g);
+    end
+
+    function s = sec(x)
+      s = 1 ./ cos(x);
+    end
+
+    function s = csc(x)
+      s = 1 ./ sin(x);
+    end
+
+    function s = cot(x)
+      s = 1 ./ tan(x);
+    end
+
+    function s = sind(x)
+      s = sin(deg2rad(x));
+    end
+
+    function s = cosd(x)
+      s = cos(deg2rad(x));
+    end
+
+    function s = tand(x)
+      s = tan(deg2rad(x));
+    end
+
+    function s = deg2rad(x)
+      s = x .* (pi / 180);
+    end
+
+    function s = rad2deg(x)
+      s = x .* (180 / pi);
+    end
+
+    function s = asin(x)
+      [first, second] = arc_derivatives(x.a);
+      s = applied(x, real_arc(@asin, x.a), first, second);
+    end
+
+    function s = acos(x)
+      [first, second] = arc_derivatives(x.a);
+      s = applied(x, real_arc(@acos, x.a), -first, -second);
+    end
+
+    function s = atan(x)
+      g = 1 ./ (1 + x.a .* x.a);
+      s = applied(x, atan(x.a), g, -2 .* x.a .* g .* g);
+    end
+
+    function s = sinh(x)
+      f = sinh(x.a);
+      s = applied(x, f, cosh(x.a), f);
+    end
+
+    function s = cosh(x)
+      f = cosh(x.a);
+      s = applied(x, f, sinh(x.a), f);
+    end
+
+    function s = tanh(x)
+      f = tanh(x.a);
+      g = 1 - f .* f;
+      s = applied(x, f, g, -2 .* f .* g);
+    end
+
+    function s = asinh(x)
+      s = log(x + sqrt(x .* x + 1));
+    end
+
+    function s = acosh(x)
+      s = log(x + sqrt(x .* x - 1));
+    end
+
+    function s = atanh(x)
+      s = 0.5 .* log((1 + x) ./ (1 - x));
+    end
+
+    function s = atan2(y, x)
+      % With D = x^2 + y^2: angle' = (x y' - y x') / D.
+      [y, x] = aligned(y, x);
+      D = x.a .* x.a + y.a .* y.a;
+      if (any(mbverify_value(D)(:) == 0))
+        error('mbverify:singular', 'atan2(0, 0) has no derivative');
+      end
+      s = x;
+      s.a = atan2(y.a, x.a);
+      s.b = (x.a .* y.b - y.a .* x.b) ./ D;
+      s.c = (x.a .* y.c - y.a .* x.c - s.b .* (x.a .* x.b + y.a .* y.b)) ./ D;
+    end
+
+    function s = hypot(x, y)
+      s = sqrt(x .* x + y .* y);
+    end
+
+    function s = abs(x)
+      v = mbverify_value(x);
+      if (isreal(v))
+        s = x .* (1 - 2 .* (v < 0));
+      else
+        s = hypot(real(x), imag(x));
+      end
+    end
+
+    function s = real(x)
+      s = each(x, @real);
+    end
+
+    function s = imag(x)
+      s = each(x, @imag);
+    end
+
+    function s = conj(x)
+      s = each(x, @conj);
+    end
+
+    function s = angle(x)
+      s = atan2(imag(x), real(x));
+    end
+
+    function s = arg(x)
+      s = angle(x);
+    end
+
+    function n = sign(x)
+      n = sign(mbverify_value(x));
+    end
+
+    function n = floor(x)
+      n = floor(mbverify_value(x));
+    end
+
+    function n = ceil(x)
+      n = ceil(mbverify_value(x));
+    end
+
+    function n = round(x)
+      n = round(mbverify_value(x));
+    end
+
+    function n = fix(x)
+      n = fix(mbverify_value(x));
+    end
+
+    function s = mod(x, y)
+      s = x - y .* floor(mbverify_value(x) ./ mbverify_value(y));
+    end
+
+    function s = rem(x, y)
+      s = x - y .* fix(mbverify_value(x) ./ mbverify_value(y));
+    end
+
+    function [s, k] = max(x, y)
+      if (nargin == 2)
+        first = mbverify_value(x) >= mbverify_value(y);
+        s = x .* first + y .* ~first;
+      else
+        [~, k] = max(mbverify_value(x)(:));
+        s = part(x, k);
+      end
+    end
+
+    function [s, k] = min(x, y)
+      if (nargin == 2)
+        first = mbverify_value(x) <= mbverify_value(y);
+        s = x .* first + y .* ~first;
+      else
+        [~, k] = min(mbverify_value(x)(:));
+        s = part(x, k);
+      end
+    end
+
+    % Vectors and matrices.
+
+    function s = sum(x, varargin)
+      s = each(x, @sum, varargin{:});
+    end
+
+    function s = cumsum(x, varargin)
+      s = each(x, @cumsum, varargin{:});
+    end
+
+    function s = mean(x, varargin)
+      s = each(x, @mean, varargin{:});
+    end
+
+    function s = sumsq(x, varargin)
+      s = sum(x .* x, varargin{:});
+    end
+
+    function s = prod(x)
+      if (~isvector(x))
+        error('mbverify:series', 'prod of a matrix that carries derivatives: use loops');
+      end
+      s = 1;
+      for k = 1:numel(x)
+        s = s .* part(x, k);
+      end
+    end
+
+    function s = dot(x, y)
+      if (isvector(x) && isvector(y))
+        if (numel(x) ~= numel(y))
+          error('mbverify:series', 'dot: sizes of x and y must match');
+        end
+        s = sum(reshape(x, [], 1) .* reshape(y, [], 1));
+      else
+        s = sum(x .* y);
+      end
+    end
+
+    function s = cross(x, y)
+      if (numel(x) ~= 3 || numel(y) ~= 3)
+        error('mbverify:series', 'cross: vectors of three are wanted');
+      end
+      if (size(x, 1) ~= size(y, 1))
+        y = y.';
+      end
+      if (isobject(x) && isobject(y) && x.level == y.level)
+        s = x;
+        s.a = cross3(x.a, y.a);
+        s.b = cross3(x.a, y.b) + cross3(x.b, y.a);
+        s.c = cross3(x.a, y.c) + cross3(x.b, y.b) + cross3(x.c, y.a);
+      elseif (is_above(x, y))
+        s = x;
+        s.a = cross3(x.a, y);
+        s.b = cross3(x.b, y);
+        s.c = cross3(x.c, y);
+      else
+        s = -cross(y, x);
+      end
+    end
+
+    function s = norm(x, kind)
+      if (nargin > 1 && ~isequal(kind, 2) && ~isequal(kind, 'fro'))
+        error('mbverify:series', 'norm: of derivatives there is the Euclidean one alone');
+      end
+      if (~isvector(x) && ~(nargin > 1 && isequal(kind, 'fro')))
+        error('mbverify:series', 'norm of a matrix that carries derivatives');
+      end
+      x = reshape(x, [], 1);
+      s = sqrt(sum(x .* x));
+    end
+
+    function s = inv(x)
+      s = x \ plain_eye(size(x, 1));
+    end
+
+    function s = det(x)
+      n = size(x, 1);
+      if (n == 1)
+        s = x;
+      elseif (n == 2)
+        s = part(x, 1) .* part(x, 4) - part(x, 3) .* part(x, 2);
+      elseif (n == 3)
+        s = dot(part(x, ':', 1), cross(part(x, ':', 2), part(x, ':', 3)));
+      else
+        % Along the first column.
+        s = 0;
+        for k = 1:n
+          rows = [1:k - 1, k + 1:n];
+          s = s + (-1) ^ (k + 1) .* part(x, k, 1) .* det(part(x, rows, 2:n));
+        end
+      end
+    end
+
+    function s = trace(x)
+      s = sum(diag(x));
+    end
+
+    function s = transpose(x)
+      s = each(x, @transpose);
+    end
+
+    function s = ctranspose(x)
+      s = each(x, @ctranspose);
+    end
+
+    function s = diag(x, varargin)
+      s = each(x, @diag, varargin{:});
+    end
+
+    function s = reshape(x, varargin)
+      s = each(x, @reshape, varargin{:});
+    end
+
+    function s = repmat(x, varargin)
+      s = each(x, @repmat, varargin{:});
+    end
+
+    function s = kron(x, y)
+      [x, y] = aligned(x, y);
+      s = x;
+      s.a = kron(x.a, y.a);
+      s.b = kron(x.a, y.b) + kron(x.b, y.a);
+      s.c = kron(x.a, y.c) + kron(x.b, y.b) + kron(x.c, y.a);
+    end
+
+    function s = blkdiag(varargin)
+      s = zeros(0, 0);
+      for k = 1:nargin
+        [m, n] = size(s);
+        [p, q] = size(varargin{k});
+        s = [s, plain_zeros([m, q]); plain_zeros([p, n]), varargin{k}];
+      end
+    end
+
+    function s = horzcat(varargin)
+      s = joined(series_of(varargin), @horzcat, varargin);
+    end
+
+    function s = vertcat(varargin)
+      s = joined(series_of(varargin), @vertcat, varargin);
+    end
+
+    function s = cat(dim, varargin)
+      if (dim == 1)
+        s = vertcat(varargin{:});
+      elseif (dim == 2)
+        s = horzcat(varargin{:});
+      else
+        error('mbverify:series', 'cat: two dimensions at most');
+      end
+    end
+
+    % Comparisons are those of the values.
+
+    function t = lt(x, y)
+      t = mbverify_value(x) < mbverify_value(y);
+    end
+
+    function t = le(x, y)
+      t = mbverify_value(x) <= mbverify_value(y);
+    end
+
+    function t = gt(x, y)
+      t = mbverify_value(x) > mbverify_value(y);
+    end
+
+    function t = ge(x, y)
+      t = mbverify_value(x) >= mbverify_value(y);
+    end
+
+    function t = eq(x, y)
+      t = mbverify_value(x) == mbverify_value(y);
+    end
+
+    function t = ne(x, y)
+      t = mbverify_value(x) ~= mbverify_value(y);
+    end
+
+    function t = logical(x)
+      t = logical(mbverify_value(x));
+    end
+
+    function t = not(x)
+      t = ~mbverify_value(x);
+    end
+
+    function t = any(x)
+      t = any(mbverify_value(x));
+    end
+
+    function t = all(x)
+      t = all(mbverify_value(x));
+    end
+
+    function t = isnan(x)
+      t = isnan(mbverify_value(x));
+    end
+
+    function t = isinf(x)
+      t = isinf(mbverify_value(x));
+    end
+
+    function t = isfinite(x)
+      t = isfinite(mbverify_value(x));
+    end
+
+    function t = isreal(x)
+      t = isreal(mbverify_value(x));
+    end
+
+    function t = iscomplex(x)
+      t = ~isreal(mbverify_value(x));
+    end
+
+    function t = isnumeric(~)
+      t = true;
+    end
+
+    function t = isfloat(~)
+      t = true;
+    end
+
+    % Size and elements.
+
+    function varargout = size(x, varargin)
+      [varargout{1:max(1, nargout)}] = size(x.a, varargin{:});
+    end
+
+    function n = numel(x, varargin)
+      if (nargin == 1)
+        n = numel(x.a);
+      else
+        n = 1;  % of values of an indexing expression
+      end
+    end
+
+    function n = length(x)
+      n = length(mbverify_value(x));
+    end
+
+    function n = ndims(x)
+      n = ndims(mbverify_value(x));
+    end
+
+    function n = rows(x)
+      n = size(x.a, 1);
+    end
+
+    function n = columns(x)
+      n = size(x.a, 2);
+    end
+
+    function t = isempty(x)
+      t = isempty(mbverify_value(x));
+    end
+
+    function t = isscalar(x)
+      t = numel(x.a) == 1;
+    end
+
+    function t = isvector(x)
+      t = isvector(mbverify_value(x));
+    end
+
+    function t = isrow(x)
+      t = size(x.a, 1) == 1;
+    end
+
+    function t = iscolumn(x)
+      t = size(x.a, 2) == 1;
+    end
+
+    function t = ismatrix(~)
+      t = true;
+    end
+
+    function t = issquare(x)
+      t = size(x.a, 1) == size(x.a, 2);
+    end
+
+    function n = end(x, k, count)
+      if (count == 1)
+        n = numel(x.a);
+      else
+        n = size(x.a, k);
+      end
+    end
+
+    function n = subsindex(x)
+      n = mbverify_value(x) - 1;
+    end
+
+    function s = subsref(x, index)
+      first = index(1);
+      if (strcmp(first.type, '()'))
+        s = x;
+        k = first.subs;
+        if (isobject(x.a))
+          s.a = subsref(x.a, first);
+          s.b = subsref_of(x.b, first);
+          s.c = subsref_of(x.c, first);
+        else
+          s.a = x.a(k{:});
+          s.b = x.b(k{:});
+          s.c = x.c(k{:});
+        end
+      elseif (strcmp(first.type, '.') && any(strcmp(first.subs, {'a', 'b', 'c', 'level'})))
+        s = x.(first.subs);
+      else
+        error('mbverify:series', 'a number has no fields and no cells');
+      end
+      if (numel(index) > 1)
+        s = subsref(s, index(2:end));
+      end
+    end
+
+    function x = subsasgn(x, index, y)
+      if (numel(index) ~= 1 || ~strcmp(index.type, '()'))
+        error('mbverify:series', 'a number has no fields and no cells');
+      end
+      if (~isobject(x))
+        x = constant(x, y.level);
+      elseif (isempty({x.level}))  % x was undefined
+        x = constant([], y.level);
+      elseif (isobject(y) && y.level > x.level)
+        x = constant(x, y.level);
+      end
+      if (isobject(y) && y.level == x.level)
+        x.a = subsasgn(x.a, index, y.a);
+        x.b = subsasgn(x.b, index, y.b);
+        x.c = subsasgn(x.c, index, y.c);
+      elseif (isempty(y))
+        k = index.subs;
+        keep = reshape(1:numel(x), size(x));
+        keep(k{:}) = [];
+        x = part(x, keep);
+      else
+        x.a = subsasgn(x.a, index, y);
+        x.b = subsasgn(x.b, index, 0);
+        x.c = subsasgn(x.c, index, 0);
+      end
+    end
+
+    function double(~)
+      error('mbverify:series', ...
+            ['a number that carries its derivatives would lose them here; ' ...
+             'mbverify_value(x) gives the value alone']);
+    end
+
+    function disp(x)
+      printf('with derivatives: ');
+      disp(mbverify_value(x));
+    end
+
+    function display(x)
+      disp(x);
+    end
+
+    % For the functions above.
+
+    % x is a series, and y a number or of a lower level: a constant to it.
+    function t = is_above(x, y)
+      t = isobject(x) && (~isobject(y) || x.level > y.level);
+    end
+
+    function [x, y] = aligned(x, y)
+      if (is_above(x, y))
+        y = constant(y, x.level);
+      elseif (is_above(y, x))
+        x = constant(x, y.level);
+      end
+    end
+
+    % x + k for a constant k.
+    function s = shifted(x, k)
+      s = x;
+      s.a = x.a + k;
+      if (numel(s.a) ~= numel(x.a))
+        nought = plain_zeros(size(s.a));
+        s.b = x.b + nought;
+        s.c = x.c + nought;
+      end
+    end
+
+    function s = inverse(y)
+      if (any(mbverify_value(y)(:) == 0))
+        error('mbverify:singular', 'division by zero');
+      end
+      r = 1 ./ y.a;
+      d = y.b .* r;
+      s = y;
+      s.a = r;
+      s.b = -(d .* r);
+      s.c = r .* (d .* d - y.c .* r);
+    end
+
+    % A function of x with its two derivatives at x.a.
+    function s = applied(x, f, first, second)
+      s = x;
+      s.a = f;
+      s.b = first .* x.b;
+      s.c = first .* x.c + 0.5 .* second .* (x.b .* x.b);
+    end
+
+    % What is linear, of each coefficient.
+    function s = each(x, f, varargin)
+      s = x;
+      s.a = f(x.a, varargin{:});
+      s.b = f(x.b, varargin{:});
+      s.c = f(x.c, varargin{:});
+    end
+
+    function s = joined(s, how, parts)
+      level = 0;
+      for k = 1:numel(parts)
+        x = parts{k};
+        if (isobject(x) && x.level > level)
+          level = x.level;
+        end
+      end
+      a = parts;
+      b = parts;
+      c = parts;
+      for k = 1:numel(parts)
+        x = parts{k};
+        if (isobject(x) && x.level == level)
+          a{k} = x.a;
+          b{k} = x.b;
+          c{k} = x.c;
+        else
+          b{k} = plain_zeros(size(x));
+          c{k} = b{k};
+        end
+      end
+      s = mbverify_series(how(a{:}), how(b{:}), how(c{:}), level);
+    end
+  end
+end
+
+function s = constant(x, level)
+  nought = plain_zeros(size(x));
+  s = mbverify_series(x, nought, nought, level);
+end
+
+function s = part(x, varargin)
+  s = subsref(x, struct('type', '()', 'subs', {varargin}));
+end
+
+function s = subsref_of(x, index)
+  k = index.subs;
+  if (isobject(x))
+    s = subsref(x, index);
+  else
+    s = x(k{:});
+  end
+end
+
+function s = whole_power(x, n, product)
+  if (n == 2)
+    s = product(x, x);
+    return
+  end
+  if (n < 0)
+    s = inverse(whole_power(x, -n, product));
+    return
+  end
+  if (n == 0)
+    s = 0 .* x + 1;
+    return
+  end
+  bits = dec2bin(n);
+  s = x;
+  for bit = bits(2:end)
+    s = product(s, s);
+    if (bit == '1')
+      s = product(s, x);
+    end
+  end
+end
+
+function f = real_sqrt(x)
+  if (isobject(x))
+    f = sqrt(x);
+  else
+    demand_real('sqrt', x, x < 0);
+    f = builtin('sqrt', x);
+  end
+end
+
+function f = real_log(x)
+  if (isobject(x))
+    f = log(x);
+  else
+    demand_real('log', x, x <= 0);
+    f = builtin('log', x);
+  end
+end
+
+function f = real_arc(arc, x)
+  if (isobject(x))
+    f = arc(x);
+  else
+    f = builtin(func2str(arc), x);
+  end
+end
+
+function [first, second] = arc_derivatives(x)
+  v = mbverify_value(x);
+  demand_real('the arc', v, abs(v) > 1);
+  s = 1 - x .* x;
+  if (any(mbverify_value(s)(:) == 0))
+    error('mbverify:singular', 'the arc of 1 has no derivative');
+  end
+  first = 1 ./ real_sqrt(s);
+  second = first .* x ./ s;
+end
+
+function demand_real(name, x, bad)
+  if (any(bad(:)) && isreal(x))
+    error('mbverify:unreachable', '%s of %g', name, x(bad)(1));
+  end
+end
+
+function s = cross3(x, y)
+  s = x([2 3 1]) .* y([3 1 2]) - x([3 1 2]) .* y([2 3 1]);
+end
+
+% Inside of derivatives zeros(…) and eye(…) are series; these are not.
+function x = plain_zeros(sizes)
+  x = builtin('zeros', sizes);
+end
+
+function x = plain_eye(n)
+  x = builtin('eye', n) + 0;
+end
+
+function s = series_of(parts)
+  for k = 1:numel(parts)
+    s = parts{k};
+    if (isa(s, 'mbverify_series'))
+      return
+    end
+  end
+end
