@@ -288,7 +288,7 @@ end
 
 % Functions of a text: name, arguments, first and last line.
 function found = functions_of(text)
-  lines = strsplit(text, "\n");
+  lines = strsplit(text, "\n", 'CollapseDelimiters', false);
   found = struct('name', {}, 'arguments', {}, 'line', {}, 'end', {});
   for k = 1:numel(lines)
     t = regexp(lines{k}, '^\s*function\s+(?:[^=(]*=\s*)?(\w+)\s*(?:\(([^)]*)\))?', 'tokens', 'once');
@@ -310,7 +310,7 @@ function found = functions_of(text)
 end
 
 function last = last_of(lines, first, last)
-  while (last > first && ~isempty(regexp(lines{last}, '^\s*([%#].*)?$', 'once')))
+  while (last > first && (isempty(strtrim(lines{last})) || any(strtrim(lines{last})(1) == '%#')))
     last = last - 1;
   end
 end
@@ -700,9 +700,11 @@ function info = described(failure, host)
     if (~isempty(frame.file) && isempty(strfind(frame.file, '/share/octave/')) ...
         && ~strncmp(frame.file, [host.own, '/'], numel(host.own) + 1))
       info.file = frame.file;
-      info.line = frame.line;
-      info.function = regexprep(frame.name, '^.*>', '');
-      return
+      info.line = max(0, frame.line);
+      if (isempty(strfind(frame.name, '<anonymous>')))
+        info.function = regexprep(frame.name, '^.*>', '');
+        return
+      end
     end
   end
 end

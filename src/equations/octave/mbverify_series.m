@@ -759,7 +759,7 @@ classdef mbverify_series
       end
     end
 
-    function double(~)
+    function x = double(x)
       error('mbverify:series', ...
             ['a number that carries its derivatives would lose them here; ' ...
              'mbverify_value(x) gives the value alone']);
