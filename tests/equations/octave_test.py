@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
 SOURCES = pathlib.Path(__file__).resolve().parents[2] / "src" / "equations"
@@ -26,20 +27,37 @@ def answers(name, text, *calls, beside=None):
         path.write_text(text, encoding="utf-8")
         for other, content in (beside or {}).items():
             (pathlib.Path(folder) / other).write_text(content, encoding="utf-8")
-        done = subprocess.run(
-            [OCTAVE, "--norc", "--quiet", "--no-history", "--no-gui", "--eval",
-             f"addpath({quoted(SOURCES / 'octave')}); mbverify_host({quoted(path)})"],
-            input="".join(json.dumps(call) + "\n" for call in calls),
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=True,
-        )
-    lines = [line.rpartition(MARK) for line in done.stdout.split("\n")]
-    given = [json.loads(answer) for _, mark, answer in lines if mark]
-    if len(given) != len(calls):
-        raise AssertionError(f"{len(given)} answers to {len(calls)} calls: {done.stderr}")
-    return given, done.stderr
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as printed:
+            host = subprocess.Popen(
+                [OCTAVE, "--norc", "--quiet", "--no-history", "--no-gui", "--eval",
+                 f"addpath({quoted(SOURCES / 'octave')}); mbverify_host({quoted(path)})"],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=printed, encoding="utf-8",
+            )
+            # Each call waits for the answer to the one before, as the program does.
+            alarm = threading.Timer(120, host.kill)
+            alarm.start()
+            given = []
+            for call in calls:
+                host.stdin.write(json.dumps(call) + "\n")
+                host.stdin.flush()
+                mark = ""
+                while not mark:
+                    line = host.stdout.readline()
+                    if not line:
+                        break
+                    _, mark, answer = line.rpartition(MARK)
+                if mark:
+                    given.append(json.loads(answer))
+            host.stdin.close()
+            rest = host.stdout.read()
+            status = host.wait()
+            host.stdout.close()
+            alarm.cancel()
+            printed.seek(0)
+            errors = printed.read()
+    if len(given) != len(calls) or status != 0 or MARK in rest:
+        raise AssertionError(f"{len(given)} answers to {len(calls)} calls, {status}: {errors}")
+    return given, errors
 
 
 def python_answers(text, *calls):

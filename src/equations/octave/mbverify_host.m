@@ -33,13 +33,13 @@ function mbverify_host(path)
   host.own = own;
   host.file = struct();
   host.parameters = struct();
-  host.scratch = '';
   addpath(fileparts(host.path), '-end');
 
   while (true)
-    line = fgetl(stdin);
-    if (~ischar(line))
-      break
+    try
+      line = input('', 's');  % fgetl would wait for the line after it
+    catch
+      break  % the end of the input
     end
     mbverify_depth = 0;
     [printed, host, answer] = guarded(host, line);
@@ -49,7 +49,6 @@ function mbverify_host(path)
     fputs(stdout, [char(30), answer, "\n"]);
     fflush(stdout);
   end
-  remove_scratch(host);
 end
 
 function [printed, host, answer] = guarded(host, line)
@@ -560,9 +559,6 @@ function text = try_source(host, call)
   end
   delete(file);
   rmdir(folder);
-end
-
-function remove_scratch(~)
 end
 
 % Numbers.
