@@ -25,9 +25,9 @@ function theta = angles(p, r)
   end
 end
 
-function c = places(p, r)  % platform, then of each limb: the arm's centre, the rods', their direction
+function c = places(p, r)  % angles, platform, of each limb: the arm's centre, the rods', direction
   theta = angles(p, r);
-  c = r;
+  c = [theta; r];
   for i = 1:3
     arm = frame(i) * [cos(theta(i)); 0; -sin(theta(i))];
     out = frame(i) * [1; 0; 0];
@@ -38,12 +38,10 @@ function c = places(p, r)  % platform, then of each limb: the arm's centre, the 
 end
 
 function torque = forces(p, q, qd, qdd)
-  [~, ~, acceleration] = mbverify_motion(@(r) places(p, r), q, qd, qdd);
-  [~, ~, turning] = mbverify_motion(@(r) angles(p, r), q, qd, qdd);
+  [~, ~, acceleration, J] = mbverify_motion(@(r) places(p, r), q, qd, qdd);
   limb = [p.m_arm, 2 * p.m_rod, 2 * p.I_rod];
-  inertia = kron([p.m_platform, limb, limb, limb]', [1; 1; 1]);
+  inertia = [p.I_arm * [1; 1; 1]; kron([p.m_platform, limb, limb, limb]', [1; 1; 1])];
   limb(3) = 0;
-  weight = kron([p.m_platform, limb, limb, limb]', [0; 0; p.g]);
-  load = mbverify_jacobian(@(r) places(p, r), q)' * (inertia .* acceleration + weight);
-  torque = mbverify_jacobian(@(r) angles(p, r), q)' \ load + p.I_arm * turning;
+  weight = [0; 0; 0; kron([p.m_platform, limb, limb, limb]', [0; 0; p.g])];
+  torque = J(1:3, :)' \ (J' * (inertia .* acceleration + weight));
 end

@@ -9,11 +9,10 @@ function eq = planar_slider_crank()
 end
 
 function torque = forces(p, q, qd, qdd)
-  f = @(motor) places(p, motor);
-  [~, ~, acceleration] = mbverify_motion(f, q, qd, qdd);
+  [~, ~, acceleration, J] = mbverify_motion(@(motor) places(p, motor), q, qd, qdd);
   inertia = [p.m_crank; p.m_crank; p.I_crank; p.m_rod; p.m_rod; p.I_rod; p.m_slider];
   weight = p.g * [0; p.m_crank; 0; 0; p.m_rod; 0; 0];
-  torque = mbverify_jacobian(f, q)' * (inertia .* acceleration + weight);
+  torque = J' * (inertia .* acceleration + weight);
 end
 
 function c = places(p, motor)  % of whatever has mass, and what turns

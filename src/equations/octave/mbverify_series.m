@@ -1,6 +1,7 @@
 classdef mbverify_series
   % a + b t + c t^2: arrays that carry their first two derivatives by one variable. The coefficients
-  % a, b, c have one size; they may be series of another variable (of a lower level).
+  % a, b, c have one size; they may be series of another variable (of a lower level). Where they are
+  % numbers, b may have further pages: first derivatives by further variables.
   %
   % Operators and functions are those of numbers, element by element or of matrices. Comparisons are
   % those of the values; mbverify_value(x) gives the values. Real functions stay real: a root,
@@ -23,12 +24,19 @@ classdef mbverify_series
     % Sums and products.
 
     function s = plus(x, y)
-      if (isobject(x) && isobject(y) && x.level == y.level)
-        s = x;
-        s.a = x.a + y.a;
-        s.b = x.b + y.b;
-        s.c = x.c + y.c;
-      elseif (is_above(x, y))
+      if (isobject(x))
+        if (isobject(y))
+          if (x.level == y.level)
+            s = x;
+            s.a = x.a + y.a;
+            s.b = x.b + y.b;
+            s.c = x.c + y.c;
+            return
+          elseif (x.level < y.level)
+            s = shifted(y, x);
+            return
+          end
+        end
         s = shifted(x, y);
       else
         s = shifted(y, x);
@@ -36,12 +44,19 @@ classdef mbverify_series
     end
 
     function s = minus(x, y)
-      if (isobject(x) && isobject(y) && x.level == y.level)
-        s = x;
-        s.a = x.a - y.a;
-        s.b = x.b - y.b;
-        s.c = x.c - y.c;
-      elseif (is_above(x, y))
+      if (isobject(x))
+        if (isobject(y))
+          if (x.level == y.level)
+            s = x;
+            s.a = x.a - y.a;
+            s.b = x.b - y.b;
+            s.c = x.c - y.c;
+            return
+          elseif (x.level < y.level)
+            s = shifted(-y, x);
+            return
+          end
+        end
         s = shifted(x, -y);
       else
         s = shifted(-y, x);
@@ -60,39 +75,61 @@ classdef mbverify_series
     end
 
     function s = times(x, y)
-      if (isobject(x) && isobject(y) && x.level == y.level)
-        s = x;
-        s.a = x.a .* y.a;
-        s.b = x.a .* y.b + x.b .* y.a;
-        s.c = x.a .* y.c + x.b .* y.b + x.c .* y.a;
-      elseif (is_above(x, y))
-        s = x;
-        s.a = x.a .* y;
-        s.b = x.b .* y;
-        s.c = x.c .* y;
+      if (isobject(x))
+        if (isobject(y))
+          if (x.level == y.level)
+            s = x;
+            xa = x.a;
+            ya = y.a;
+            xb = x.b;
+            yb = y.b;
+            s.a = xa .* ya;
+            b = xa .* yb + xb .* ya;
+            s.b = b;
+            if (ndims(b) > 2)
+              xb = xb(:, :, 1);
+              yb = yb(:, :, 1);
+            end
+            s.c = xa .* y.c + xb .* yb + x.c .* ya;
+            return
+          elseif (x.level < y.level)
+            s = y;
+            s.a = x .* y.a;
+            s.b = x .* y.b;
+            s.c = x .* y.c;
+            return
+          end
+        end
       else
         s = y;
         s.a = x .* y.a;
         s.b = x .* y.b;
         s.c = x .* y.c;
+        return
       end
+      s = x;
+      s.a = x.a .* y;
+      s.b = x.b .* y;
+      s.c = x.c .* y;
     end
 
     function s = mtimes(x, y)
-      if (isobject(x) && isobject(y) && x.level == y.level)
+      if (numel(x) == 1 || numel(y) == 1)
+        s = x .* y;
+      elseif (isobject(x) && isobject(y) && x.level == y.level)
         s = x;
         s.a = x.a * y.a;
-        s.b = x.a * y.b + x.b * y.a;
-        s.c = x.a * y.c + x.b * y.b + x.c * y.a;
-      elseif (is_above(x, y))
+        s.b = by_pages(x.a, y.b) + by_pages(x.b, y.a);
+        s.c = x.a * y.c + first(x.b) * first(y.b) + x.c * y.a;
+      elseif (isobject(x) && (~isobject(y) || x.level > y.level))
         s = x;
         s.a = x.a * y;
-        s.b = x.b * y;
+        s.b = by_pages(x.b, y);
         s.c = x.c * y;
       else
         s = y;
         s.a = x * y.a;
-        s.b = x * y.b;
+        s.b = by_pages(x, y.b);
         s.c = x * y.c;
       end
     end
@@ -139,8 +176,9 @@ classdef mbverify_series
       [A, r] = aligned(A, r);
       x = r;
       x.a = A.a \ r.a;
-      x.b = A.a \ (r.b - A.b * x.a);
-      x.c = A.a \ (r.c - A.b * x.b - A.c * x.a);
+      b = r.b - by_pages(A.b, x.a);
+      x.b = reshape(A.a \ reshape(b, size(b, 1), []), size(b));
+      x.c = A.a \ (r.c - first(A.b) * first(x.b) - A.c * x.a);
     end
 
     function s = power(x, n)
@@ -148,13 +186,17 @@ classdef mbverify_series
         s = exp(n .* log(x));
         return
       end
-      if (numel(n) == 1 && n == round(n) && abs(n) <= 64)
-        s = whole_power(x, n, @times);
-        return
-      end
-      if (numel(n) == 1 && n == 0.5)
-        s = sqrt(x);
-        return
+      if (numel(n) == 1)
+        if (n == 2)
+          s = x .* x;
+          return
+        elseif (n == round(n) && abs(n) <= 64)
+          s = whole_power(x, n, @times);
+          return
+        elseif (n == 0.5)
+          s = sqrt(x);
+          return
+        end
       end
       bad = n ~= round(n) & mbverify_value(x) < 0;
       if (any(bad(:)))
@@ -169,12 +211,16 @@ classdef mbverify_series
 
     function s = mpower(x, n)
       if (numel(x) == 1)
-        s = x .^ n;
+        if (~isobject(n) && numel(n) == 1 && n == 2)
+          s = x .* x;
+        else
+          s = x .^ n;
+        end
       elseif (~isobject(n) && numel(n) == 1 && n == round(n))
         if (n < 0)
           s = whole_power(inv(x), -n, @mtimes);
         elseif (n == 0)
-          s = constant(eye(size(x, 1)), x.level);
+          s = constant(plain_eye(size(x, 1)), x.level);
         else
           s = whole_power(x, n, @mtimes);
         end
@@ -189,7 +235,7 @@ classdef mbverify_series
       f = real_sqrt(x.a);
       nil = mbverify_value(f) == 0;
       if (any(nil(:)))
-        if (isobject(x.a) || any(x.b(nil) ~= 0) || any(x.c(nil) ~= 0))
+        if (isobject(x.a) || any((x.b .* nil)(:)) || any((x.c .* nil)(:)))
           error('mbverify:singular', 'the root of 0 has no derivative');
         end
         g = f;
@@ -331,7 +377,8 @@ classdef mbverify_series
       s = x;
       s.a = atan2(y.a, x.a);
       s.b = (x.a .* y.b - y.a .* x.b) ./ D;
-      s.c = (x.a .* y.c - y.a .* x.c - s.b .* (x.a .* x.b + y.a .* y.b)) ./ D;
+      s.c = (x.a .* y.c - y.a .* x.c - ...
+             first(s.b) .* (x.a .* first(x.b) + y.a .* first(y.b))) ./ D;
     end
 
     function s = hypot(x, y)
@@ -448,7 +495,7 @@ classdef mbverify_series
         if (numel(x) ~= numel(y))
           error('mbverify:series', 'dot: sizes of x and y must match');
         end
-        s = sum(reshape(x, [], 1) .* reshape(y, [], 1));
+        s = reshape(x, 1, []) * reshape(y, [], 1);
       else
         s = sum(x .* y);
       end
@@ -465,7 +512,7 @@ classdef mbverify_series
         s = x;
         s.a = cross3(x.a, y.a);
         s.b = cross3(x.a, y.b) + cross3(x.b, y.a);
-        s.c = cross3(x.a, y.c) + cross3(x.b, y.b) + cross3(x.c, y.a);
+        s.c = cross3(x.a, y.c) + cross3(first(x.b), first(y.b)) + cross3(x.c, y.a);
       elseif (is_above(x, y))
         s = x;
         s.a = cross3(x.a, y);
@@ -483,8 +530,18 @@ classdef mbverify_series
       if (~isvector(x) && ~(nargin > 1 && isequal(kind, 'fro')))
         error('mbverify:series', 'norm of a matrix that carries derivatives');
       end
-      x = reshape(x, [], 1);
-      s = sqrt(sum(x .* x));
+      s = x;
+      if (isobject(x.a))
+        x = reshape(x, [], 1);
+        s = sqrt(sum(x .* x));
+        return
+      end
+      a = x.a(:);
+      b = reshape(x.b, numel(a), []);
+      s.a = a.' * a;
+      s.b = reshape(2 .* (a.' * b), 1, 1, []);
+      s.c = 2 .* (a.' * x.c(:)) + b(:, 1).' * b(:, 1);
+      s = sqrt(s);
     end
 
     function s = inv(x)
@@ -514,11 +571,17 @@ classdef mbverify_series
     end
 
     function s = transpose(x)
-      s = each(x, @transpose);
+      s = x;
+      s.a = x.a.';
+      s.b = transposed(x.b);
+      s.c = x.c.';
     end
 
     function s = ctranspose(x)
-      s = each(x, @ctranspose);
+      s = x;
+      s.a = x.a';
+      s.b = conj(transposed(x.b));
+      s.c = x.c';
     end
 
     function s = diag(x, varargin)
@@ -526,7 +589,14 @@ classdef mbverify_series
     end
 
     function s = reshape(x, varargin)
-      s = each(x, @reshape, varargin{:});
+      s = x;
+      s.a = reshape(x.a, varargin{:});
+      if (ndims(x.b) > 2)
+        s.b = reshape(x.b, size(s.a, 1), size(s.a, 2), []);
+      else
+        s.b = reshape(x.b, varargin{:});
+      end
+      s.c = reshape(x.c, varargin{:});
     end
 
     function s = repmat(x, varargin)
@@ -535,10 +605,10 @@ classdef mbverify_series
 
     function s = kron(x, y)
       [x, y] = aligned(x, y);
-      s = x;
-      s.a = kron(x.a, y.a);
-      s.b = kron(x.a, y.b) + kron(x.b, y.a);
-      s.c = kron(x.a, y.c) + kron(x.b, y.b) + kron(x.c, y.a);
+      [m, n] = size(x);
+      [p, q] = size(y);
+      x = part(x, repmat(reshape(1:m, 1, m), p, 1)(:), repmat(reshape(1:n, 1, n), q, 1)(:));
+      s = x .* repmat(y, m, n);
     end
 
     function s = blkdiag(varargin)
@@ -709,21 +779,30 @@ classdef mbverify_series
     end
 
     function s = subsref(x, index)
-      first = index(1);
-      if (strcmp(first.type, '()'))
+      entry = index(1);
+      if (strcmp(entry.type, '()'))
         s = x;
-        k = first.subs;
+        k = entry.subs;
         if (isobject(x.a))
-          s.a = subsref(x.a, first);
-          s.b = subsref_of(x.b, first);
-          s.c = subsref_of(x.c, first);
+          s.a = subsref(x.a, entry);
+          s.b = subsref_of(x.b, entry);
+          s.c = subsref_of(x.c, entry);
         else
-          s.a = x.a(k{:});
-          s.b = x.b(k{:});
+          a = x.a(k{:});
+          b = x.b;
+          s.a = a;
+          if (ndims(b) == 2)
+            s.b = b(k{:});
+          elseif (numel(k) == 2)
+            s.b = b(k{:}, :);
+          else
+            b = reshape(b, [], size(b, 3));
+            s.b = reshape(b(k{1}(:), :), size(a, 1), size(a, 2), []);
+          end
           s.c = x.c(k{:});
         end
-      elseif (strcmp(first.type, '.') && any(strcmp(first.subs, {'a', 'b', 'c', 'level'})))
-        s = x.(first.subs);
+      elseif (strcmp(entry.type, '.') && any(strcmp(entry.subs, {'a', 'b', 'c', 'level'})))
+        s = x.(entry.subs);
       else
         error('mbverify:series', 'a number has no fields and no cells');
       end
@@ -745,7 +824,7 @@ classdef mbverify_series
       end
       if (isobject(y) && y.level == x.level)
         x.a = subsasgn(x.a, index, y.a);
-        x.b = subsasgn(x.b, index, y.b);
+        x.b = paged_assign(x.b, index, y.b);
         x.c = subsasgn(x.c, index, y.c);
       elseif (isempty(y))
         k = index.subs;
@@ -754,7 +833,7 @@ classdef mbverify_series
         x = part(x, keep);
       else
         x.a = subsasgn(x.a, index, y);
-        x.b = subsasgn(x.b, index, 0);
+        x.b = paged_assign(x.b, index, 0);
         x.c = subsasgn(x.c, index, 0);
       end
     end
@@ -809,22 +888,38 @@ classdef mbverify_series
       s = y;
       s.a = r;
       s.b = -(d .* r);
+      if (ndims(d) > 2)
+        d = d(:, :, 1);
+      end
       s.c = r .* (d .* d - y.c .* r);
     end
 
     % A function of x with its two derivatives at x.a.
-    function s = applied(x, f, first, second)
+    function s = applied(x, f, f1, f2)
       s = x;
+      b = x.b;
       s.a = f;
-      s.b = first .* x.b;
-      s.c = first .* x.c + 0.5 .* second .* (x.b .* x.b);
+      s.b = f1 .* b;
+      if (ndims(b) > 2)
+        b = b(:, :, 1);
+      end
+      s.c = f1 .* x.c + 0.5 .* f2 .* (b .* b);
     end
 
     % What is linear, of each coefficient.
     function s = each(x, f, varargin)
       s = x;
       s.a = f(x.a, varargin{:});
-      s.b = f(x.b, varargin{:});
+      b = x.b;
+      if (ndims(b) == 2)
+        s.b = f(b, varargin{:});
+      else
+        pages = cell(1, size(b, 3));
+        for k = 1:numel(pages)
+          pages{k} = f(b(:, :, k), varargin{:});
+        end
+        s.b = cat(3, pages{:});
+      end
       s.c = f(x.c, varargin{:});
     end
 
@@ -839,15 +934,24 @@ classdef mbverify_series
       a = parts;
       b = parts;
       c = parts;
+      pages = 1;
       for k = 1:numel(parts)
         x = parts{k};
         if (isobject(x) && x.level == level)
           a{k} = x.a;
           b{k} = x.b;
           c{k} = x.c;
+          pages = max(pages, size(b{k}, 3));
         else
-          b{k} = plain_zeros(size(x));
+          b{k} = builtin('zeros', size(x));
           c{k} = b{k};
+        end
+      end
+      if (pages > 1)
+        for k = 1:numel(parts)
+          if (size(b{k}, 3) < pages)
+            b{k} = repmat(b{k}, 1, 1, pages);
+          end
         end
       end
       s = mbverify_series(how(a{:}), how(b{:}), how(c{:}), level);
@@ -940,7 +1044,11 @@ function demand_real(name, x, bad)
 end
 
 function s = cross3(x, y)
-  s = x([2 3 1]) .* y([3 1 2]) - x([3 1 2]) .* y([2 3 1]);
+  if (size(x, 1) == 3)
+    s = x([2 3 1], :, :) .* y([3 1 2], :, :) - x([3 1 2], :, :) .* y([2 3 1], :, :);
+  else
+    s = x(:, [2 3 1], :) .* y(:, [3 1 2], :) - x(:, [3 1 2], :) .* y(:, [2 3 1], :);
+  end
 end
 
 % Inside of derivatives zeros(…) and eye(…) are series; these are not.
@@ -959,4 +1067,48 @@ function s = series_of(parts)
       return
     end
   end
+end
+
+% The derivatives by the first variable.
+function b = first(b)
+  if (ndims(b) > 2)
+    b = b(:, :, 1);
+  end
+end
+
+function s = by_pages(x, y)
+  m = size(x, 3);
+  n = size(y, 3);
+  if (m == 1 && n == 1)
+    s = x * y;
+  elseif (m == 1)
+    s = reshape(x * reshape(y, size(y, 1), []), size(x, 1), [], n);
+  else
+    s = builtin('zeros', size(x, 1), size(y, 2), m);
+    for k = 1:m
+      s(:, :, k) = x(:, :, k) * y;
+    end
+  end
+end
+
+function s = transposed(x)
+  if (ndims(x) > 2)
+    s = permute(x, [2 1 3]);
+  else
+    s = x.';
+  end
+end
+
+function x = paged_assign(x, index, y)
+  m = size(x, 3);
+  n = size(y, 3);
+  if (m == 1 && n == 1)
+    x = subsasgn(x, index, y);
+    return
+  end
+  pages = cell(1, max(m, n));
+  for k = 1:numel(pages)
+    pages{k} = subsasgn(x(:, :, min(k, m)), index, y(:, :, min(k, n)));
+  end
+  x = cat(3, pages{:});
 end
