@@ -114,29 +114,64 @@ classdef mbverify_series
     end
 
     function s = mtimes(x, y)
-      if (numel(x) == 1 || numel(y) == 1)
-        s = x .* y;
-      elseif (isobject(x) && isobject(y) && x.level == y.level)
+      if (isobject(x))
+        xa = x.a;
+        if (isobject(y))
+          ya = y.a;
+          if (numel(xa) == 1 || numel(ya) == 1)
+            s = x .* y;
+            return
+          elseif (x.level == y.level)
+            s = x;
+            xb = x.b;
+            yb = y.b;
+            s.a = xa * ya;
+            if (ndims(xb) == 2 && ndims(yb) == 2)
+              s.b = xa * yb + xb * ya;
+              s.c = xa * y.c + xb * yb + x.c * ya;
+            else
+              s.b = by_pages(xa, yb) + by_pages(xb, ya);
+              s.c = xa * y.c + xb(:, :, 1) * yb(:, :, 1) + x.c * ya;
+            end
+            return
+          elseif (x.level < y.level)
+            s = y;
+            s.a = x * ya;
+            s.b = x * y.b;
+            s.c = x * y.c;
+            return
+          end
+        end
+        b = x.b;
         s = x;
-        s.a = x.a * y.a;
-        s.b = by_pages(x.a, y.b) + by_pages(x.b, y.a);
-        s.c = x.a * y.c + first(x.b) * first(y.b) + x.c * y.a;
-      elseif (isobject(x) && (~isobject(y) || x.level > y.level))
-        s = x;
-        s.a = x.a * y;
-        s.b = by_pages(x.b, y);
+        s.a = xa * y;
+        if (ndims(b) == 2)
+          s.b = b * y;
+        elseif (numel(xa) == 1 || numel(y) == 1)
+          s.b = b .* y;
+        else
+          s.b = by_pages(b, y);
+        end
         s.c = x.c * y;
       else
+        ya = y.a;
+        b = y.b;
         s = y;
-        s.a = x * y.a;
-        s.b = by_pages(x, y.b);
+        s.a = x * ya;
+        if (ndims(b) == 2)
+          s.b = x * b;
+        elseif (numel(x) == 1 || numel(ya) == 1)
+          s.b = x .* b;
+        else
+          s.b = by_pages(x, b);
+        end
         s.c = x * y.c;
       end
     end
 
     function s = rdivide(x, y)
-      if (is_above(x, y))
-        if (any(mbverify_value(y)(:) == 0))
+      if (~isobject(y))
+        if (any(y(:) == 0))
           error('mbverify:singular', 'division by zero');
         end
         s = x;
@@ -153,8 +188,16 @@ classdef mbverify_series
     end
 
     function s = mrdivide(x, y)
-      if (numel(y) == 1)
-        s = x ./ y;
+      if (~isobject(y) && numel(y) == 1)
+        if (y == 0)
+          error('mbverify:singular', 'division by zero');
+        end
+        s = x;
+        s.a = x.a ./ y;
+        s.b = x.b ./ y;
+        s.c = x.c ./ y;
+      elseif (numel(y) == 1)
+        s = x .* inverse(y);
       else
         s = (y.' \ x.').';
       end
@@ -233,6 +276,10 @@ classdef mbverify_series
 
     function s = sqrt(x)
       f = real_sqrt(x.a);
+      if (~isobject(f) && all(f(:)))
+        s = applied(x, f, 0.5 ./ f, -0.25 ./ (x.a .* f));
+        return
+      end
       nil = mbverify_value(f) == 0;
       if (any(nil(:)))
         if (isobject(x.a) || any((x.b .* nil)(:)) || any((x.c .* nil)(:)))
@@ -382,7 +429,23 @@ classdef mbverify_series
     end
 
     function s = hypot(x, y)
-      s = sqrt(x .* x + y .* y);
+      [x, y] = aligned(x, y);
+      s = x;
+      f = sqrt(x.a .* x.a + y.a .* y.a);
+      if (any(mbverify_value(f)(:) == 0))
+        error('mbverify:singular', 'hypot(0, 0) has no derivative');
+      end
+      xb = x.b;
+      yb = y.b;
+      b = (x.a .* xb + y.a .* yb) ./ f;
+      s.a = f;
+      s.b = b;
+      if (ndims(b) > 2)
+        b = b(:, :, 1);
+        xb = xb(:, :, 1);
+        yb = yb(:, :, 1);
+      end
+      s.c = (x.a .* x.c + y.a .* y.c + 0.5 .* (xb .* xb + yb .* yb - b .* b)) ./ f;
     end
 
     function s = abs(x)
@@ -638,6 +701,13 @@ classdef mbverify_series
       end
     end
 
+    function v = mbverify_value(x)
+      v = x.a;
+      while (isobject(v))
+        v = mbverify_value(v);
+      end
+    end
+
     % Comparisons are those of the values.
 
     function t = lt(x, y)
@@ -780,7 +850,7 @@ classdef mbverify_series
 
     function s = subsref(x, index)
       entry = index(1);
-      if (strcmp(entry.type, '()'))
+      if (entry.type(1) == '(')
         s = x;
         k = entry.subs;
         if (isobject(x.a))
@@ -861,9 +931,11 @@ classdef mbverify_series
     end
 
     function [x, y] = aligned(x, y)
-      if (is_above(x, y))
+      if (isobject(x) && isobject(y) && x.level == y.level)
+        return
+      elseif (is_above(x, y))
         y = constant(y, x.level);
-      elseif (is_above(y, x))
+      else
         x = constant(x, y.level);
       end
     end
@@ -880,10 +952,11 @@ classdef mbverify_series
     end
 
     function s = inverse(y)
-      if (any(mbverify_value(y)(:) == 0))
+      a = y.a;
+      if (any(mbverify_value(a)(:) == 0))
         error('mbverify:singular', 'division by zero');
       end
-      r = 1 ./ y.a;
+      r = 1 ./ a;
       d = y.b .* r;
       s = y;
       s.a = r;
@@ -924,7 +997,7 @@ classdef mbverify_series
     end
 
     function s = joined(s, how, parts)
-      level = 0;
+      level = s.level;
       for k = 1:numel(parts)
         x = parts{k};
         if (isobject(x) && x.level > level)
@@ -941,7 +1014,9 @@ classdef mbverify_series
           a{k} = x.a;
           b{k} = x.b;
           c{k} = x.c;
-          pages = max(pages, size(b{k}, 3));
+          if (ndims(b{k}) > 2)
+            pages = size(b{k}, 3);
+          end
         else
           b{k} = builtin('zeros', size(x));
           c{k} = b{k};
@@ -954,7 +1029,10 @@ classdef mbverify_series
           end
         end
       end
-      s = mbverify_series(how(a{:}), how(b{:}), how(c{:}), level);
+      s.a = how(a{:});
+      s.b = how(b{:});
+      s.c = how(c{:});
+      s.level = level;
     end
   end
 end
