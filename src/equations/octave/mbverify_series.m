@@ -684,11 +684,19 @@ classdef mbverify_series
     end
 
     function s = horzcat(varargin)
-      s = joined(series_of(varargin), @horzcat, varargin);
+      s = varargin{1};
+      if (~isobject(s))
+        s = series_of(varargin);
+      end
+      s = joined(s, @horzcat, varargin);
     end
 
     function s = vertcat(varargin)
-      s = joined(series_of(varargin), @vertcat, varargin);
+      s = varargin{1};
+      if (~isobject(s))
+        s = series_of(varargin);
+      end
+      s = joined(s, @vertcat, varargin);
     end
 
     function s = cat(dim, varargin)
@@ -998,41 +1006,40 @@ classdef mbverify_series
 
     function s = joined(s, how, parts)
       level = s.level;
-      for k = 1:numel(parts)
-        x = parts{k};
-        if (isobject(x) && x.level > level)
-          level = x.level;
-        end
-      end
       a = parts;
       b = parts;
       c = parts;
       pages = 1;
       for k = 1:numel(parts)
         x = parts{k};
-        if (isobject(x) && x.level == level)
-          a{k} = x.a;
-          b{k} = x.b;
-          c{k} = x.c;
-          if (ndims(b{k}) > 2)
-            pages = size(b{k}, 3);
+        if (isobject(x))
+          if (x.level == level)
+            a{k} = x.a;
+            bk = x.b;
+            b{k} = bk;
+            c{k} = x.c;
+            if (ndims(bk) > 2)
+              pages = size(bk, 3);
+            end
+            continue
+          elseif (x.level > level)
+            s = joined(x, how, parts);
+            return
           end
-        else
-          b{k} = builtin('zeros', size(x));
-          c{k} = b{k};
         end
+        b{k} = builtin('zeros', size(x));
+        c{k} = b{k};
       end
       if (pages > 1)
         for k = 1:numel(parts)
-          if (size(b{k}, 3) < pages)
-            b{k} = repmat(b{k}, 1, 1, pages);
+          if (ndims(b{k}) == 2)
+            b{k} = b{k}(:, :, builtin('ones', 1, pages));
           end
         end
       end
       s.a = how(a{:});
       s.b = how(b{:});
       s.c = how(c{:});
-      s.level = level;
     end
   end
 end
