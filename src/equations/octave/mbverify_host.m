@@ -24,13 +24,15 @@ function mbverify_host(path)
   warning('off', 'Octave:shadowed-function');
   warning('off', 'Octave:possible-matlab-short-circuit-operator');
   own = fileparts(mfilename('fullpath'));
-  addpath(fullfile(own, 'shadow'));
+  shadows = mbverify_shadows();
+  tidy = onCleanup(@() remove(shadows));
+  addpath(shadows);
   % A solution by least squares in place of none is no answer.
   warning('error', 'Octave:singular-matrix');
   warning('error', 'Octave:nearly-singular-matrix');
 
   host.path = canonical(path);
-  host.own = own;
+  host.own = {[own, '/'], [shadows, '/']};
   host.file = struct();
   host.parameters = struct();
   addpath(fileparts(host.path), '-end');
@@ -49,6 +51,12 @@ function mbverify_host(path)
     fputs(stdout, [char(30), answer, "\n"]);
     fflush(stdout);
   end
+end
+
+function remove(folder)
+  rmpath(folder);
+  confirm_recursive_rmdir(false, 'local');
+  rmdir(folder, 's');
 end
 
 function [printed, host, answer] = guarded(host, line)
@@ -694,7 +702,7 @@ function info = described(failure, host)
   for k = 1:numel(failure.stack)
     frame = failure.stack(k);
     if (~isempty(frame.file) && isempty(strfind(frame.file, '/share/octave/')) ...
-        && ~strncmp(frame.file, [host.own, '/'], numel(host.own) + 1))
+        && ~any(cellfun(@(own) strncmp(frame.file, own, numel(own)), host.own)))
       info.file = frame.file;
       info.line = max(0, frame.line);
       if (isempty(strfind(frame.name, '<anonymous>')))

@@ -1124,7 +1124,8 @@ end
 
 function demand_real(name, x, bad)
   if (any(bad(:)) && isreal(x))
-    error('mbverify:unreachable', '%s of %g', name, x(bad)(1));
+    x = x(bad);
+    error('mbverify:unreachable', '%s of %g', name, x(1));
   end
 end
 
