@@ -13,7 +13,6 @@ import unittest
 
 SOURCES = pathlib.Path(__file__).resolve().parents[2] / "src" / "equations"
 OCTAVE = shutil.which("octave-cli")
-MARK = "\x1e"  # before each answer
 
 
 def quoted(text):
@@ -40,14 +39,10 @@ def answers(name, text, *calls, beside=None):
             for call in calls:
                 host.stdin.write(json.dumps(call) + "\n")
                 host.stdin.flush()
-                mark = ""
-                while not mark:
-                    line = host.stdout.readline()
-                    if not line:
-                        break
-                    _, mark, answer = line.rpartition(MARK)
-                if mark:
-                    given.append(json.loads(answer))
+                line = host.stdout.readline()
+                if not line:
+                    break
+                given.append(json.loads(line))
             host.stdin.close()
             rest = host.stdout.read()
             status = host.wait()
@@ -55,7 +50,7 @@ def answers(name, text, *calls, beside=None):
             alarm.cancel()
             printed.seek(0)
             errors = printed.read()
-    if len(given) != len(calls) or status != 0 or MARK in rest:
+    if len(given) != len(calls) or status != 0 or rest:
         raise AssertionError(f"{len(given)} answers to {len(calls)} calls, {status}: {errors}")
     return given, errors
 
@@ -361,10 +356,10 @@ class Calls(unittest.TestCase):
 
     def assert_same(self, a, b, where=""):
         if isinstance(a, dict) and isinstance(b, dict):
-            self.assertEqual(sorted(a), sorted(b), where)
-            for key in a:
-                if key not in ("line", "end", "file"):
-                    self.assert_same(a[key], b[key], f"{where}.{key}")
+            places = {"line", "end", "corrected_line", "corrected_end", "file"}
+            self.assertEqual(sorted(set(a) - places), sorted(set(b) - places), where)
+            for key in set(a) - places:
+                self.assert_same(a[key], b[key], f"{where}.{key}")
         elif isinstance(a, list) and isinstance(b, list):
             self.assertEqual(len(a), len(b), where)
             for k, (x, y) in enumerate(zip(a, b)):
@@ -404,11 +399,13 @@ class Calls(unittest.TestCase):
         self.assertIn("drives(p, a, b)", lines[form["line"] - 1])
         self.assertIn("eq3(p, u, M)", lines[third["line"] - 1])
         self.assertEqual(third["end"], third["line"] + 2)
+        self.assertIn("eq3c(p, u, M)", lines[third["corrected_line"] - 1])
+        self.assertEqual(third["corrected_end"], third["corrected_line"] + 4)
         self.assertIn("'(4)'", lines[fourth["line"] - 1])
         self.assertIn("'each'", lines[fourth["end"] - 1])
 
     def test_of_edited_texts(self):
-        rows = [{"u": [1, 2, 3], "M": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]
+        rows = [{"u": [1, 2, 3], "M": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "other": 5}]
 
         def edited(text):
             return {"do": "try_source", "source": text, "index": 0, "rows": rows}
@@ -423,6 +420,9 @@ class Calls(unittest.TestCase):
             edited(OCTAVE_FILE.replace(right, "y = nothing(u);")),
             {"do": "equation", "index": 0, "rows": rows},
             edited(OCTAVE_FILE),
+            edited(OCTAVE_FILE.replace(right, "y = other * u;")),
+            {**edited(OCTAVE_FILE.replace("y = -p.ratio", "y = -other * p.ratio")),
+             "corrected": True},
         )
         self.assertEqual(given[2], {"rows": [[3, 5, 7]]})
         self.assertEqual(given[3], {"rows": [[1, 0, -1]]})
@@ -430,6 +430,8 @@ class Calls(unittest.TestCase):
         self.assertIn("nothing", given[5]["failed"])
         self.assertEqual(given[6], {"rows": [[2, 4, 6]]})
         self.assertEqual(given[7], {"rows": [[2, 4, 6]]})
+        self.assertEqual(given[8], {"rows": [[5, 10, 15]]})
+        self.assertEqual(given[9], {"rows": [[-10, -20, -30]]})
 
     FILE = """function eq = my_try()
   eq.mechanism = 'm';
@@ -515,7 +517,7 @@ end
             "disp(x); printf('one'); fprintf(1, 'two'); fdisp(stdout, 3); x, d = x;",
             "puts('four'); system('echo five'); f = q; warning('six');")
         self.assertEqual(answer, {"values": [[0.25, 1, 0]], "forces": [0.25]})
-        for word in ("one", "two", "four", "six"):
+        for word in ("one", "two", "four", "five", "six"):
             self.assertIn(word, printed)
 
     def test_what_is_not_finite(self):

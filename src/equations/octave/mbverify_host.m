@@ -1,7 +1,6 @@
 function mbverify_host(path)
   % Answers mbverify's calls about one file of equations: a JSON text a line on standard input, one a
-  % line on standard output. Before each answer stands the character 30 (record separator): a reader
-  % takes what follows the last one of a line. What the file prints by Octave goes to standard error.
+  % line on standard output. What the file prints goes to standard error.
   %
   % The file is a function without arguments that gives a structure of handles:
   %
@@ -48,7 +47,7 @@ function mbverify_host(path)
     if (~isempty(printed))
       fputs(stderr, printed);
     end
-    fputs(stdout, [char(30), answer, "\n"]);
+    fputs(stdout, [answer, "\n"]);
     fflush(stdout);
   end
 end
@@ -131,7 +130,7 @@ function host = load_file(host, path)
   for k = 1:numel(given)
     eq = given{k};
     if (isfield(eq, 'drives') || isfield(eq, 'mechanism'))
-      [form, info] = read_form(eq, source);
+      [form, info] = read_form(eq, source, text);
       host.file.forms{end + 1} = form;
       forms{end + 1} = info;
     end
@@ -155,7 +154,7 @@ function host = load_file(host, path)
   host.file.info.equations = equations;
 end
 
-function [form, info] = read_form(eq, source)
+function [form, info] = read_form(eq, source, text)
   known = {'mechanism', 'commands', 'drives', 'forces', 'outputs', 'rates', 'jacobian', 'covers', ...
            'states', 'equations'};
   for name = fieldnames(eq).'
@@ -200,6 +199,10 @@ function [form, info] = read_form(eq, source)
   info.mechanism = eq.mechanism;
   info.commands = form.commands;
   info.line = place.line;
+  at = regexp(text, '\.drives\s*=|''drives''', 'once');
+  if (place.line == 0 && ~isempty(at))  % an anonymous function
+    info.line = 1 + sum(text(1:at) == "\n");
+  end
   info.unchecked = isfield(eq, 'covers') && ischar(eq.covers) && strcmp(eq.covers, 'unchecked');
   info.parts = fieldnames(form.parts).';
   info.takes_loads = form.takes_loads;
@@ -222,19 +225,32 @@ function [entry, info] = read_equation(eq, source, text)
   entry.function = eq.function;
   entry.arguments = place.arguments(2:end);
   entry.corrected = [];
+  at = struct('line', 0, 'end', 0);
+  all_arguments = entry.arguments;
   if (isfield(eq, 'corrected') && is_function(eq.corrected))
     entry.corrected = eq.corrected;
     at = located(eq.corrected, source);
     entry.corrected_arguments = at.arguments(2:end);
+    if (at.line == 0)
+      at = place;
+    end
+    all_arguments = unique([all_arguments, entry.corrected_arguments], 'stable');
   end
   info.number = eq.number;
   info.gives = eq.gives;
   info.line = place.line;
   info.end = place.end;
-  info.arguments = entry.arguments;
+  info.corrected_line = at.line;
+  info.corrected_end = at.end;
+  info.arguments = all_arguments;
   info.has_corrected = ~isempty(entry.corrected);
   info.given = as_map(field_or(eq, 'given', struct()));
   info.each = as_map(field_or(eq, 'each', struct()));
+  for k = 1:numel(info.each.values)
+    if (~iscell(info.each.values{k}))
+      info.each.values{k} = num2cell(reshape(info.each.values{k}, 1, []));
+    end
+  end
   info.printed = field_or(eq, 'printed', '');
   info.corrected = field_or(eq, 'corrected_text', '');
   if (isfield(eq, 'corrected') && ischar(eq.corrected))
@@ -550,23 +566,49 @@ function text = equation_text(host, p, k, call)
 end
 
 function text = try_source(host, call)
-  % An edited text, in a folder of its own: Octave tells files apart by name and second.
+  % An edited text, in a folder of its own: Octave tells files apart by name and second. It may name
+  % whatever is given, not the function's arguments alone.
   folder = tempname();
   [~, name] = fileparts(host.path);
   mkdir(folder);
   file = fullfile(folder, [name, '.m']);
   id = fopen(file, 'w');
-  fwrite(id, call.source);
+  fputs(id, with_all_given(host, call));
   fclose(id);
   try
     other = load_file(host, file);
-    call.rows = field_or(call, 'rows', []);
     text = equation_text(other, host.parameters, call.index + 1, call);
   catch failure
     text = json(struct('failed', failure.message));
   end
   delete(file);
   rmdir(folder);
+end
+
+function text = with_all_given(host, call)
+  text = call.source;
+  entry = host.file.equations{call.index + 1};
+  f = entry.function;
+  if (field_or(call, 'corrected', false))
+    f = entry.corrected;
+  end
+  row = call.rows;
+  if (iscell(row) && ~isempty(row))
+    row = row{1};
+  end
+  source = functions_of(text);
+  k = find(strcmp({source.name}, functions(f).function), 1);
+  if (isempty(k) || ~isstruct(row))
+    return
+  end
+  more = setdiff(fieldnames(row).', source(k).arguments);
+  more = more(cellfun(@isvarname, more));
+  lines = strsplit(text, "\n", 'CollapseDelimiters', false);
+  if (~isempty(more) && ~isempty(source(k).arguments))
+    given = strjoin([source(k).arguments, more], ', ');
+    lines{source(k).line} = regexprep(lines{source(k).line}, '\([^)]*\)', ['(', given, ')'], 'once');
+    text = strjoin(lines, "\n");
+  end
 end
 
 % Numbers.

@@ -3,6 +3,7 @@ function folder = mbverify_shadows()
   % * where derivatives are taken, zeros, ones and eye give arrays that can take numbers with
   %   derivatives (Octave cannot assign these to elements of plain arrays);
   % * roots, logarithms and arcs of real numbers are real, or end the computation;
+  % * what programs print that the file starts goes where its own prints go;
   % * rows of plain numbers in a matrix with others that carry derivatives: Octave asks for horzcat.
   % Octave's own functions, which may count on the built-in ones, get these.
   folder = tempname();
@@ -33,6 +34,15 @@ function folder = mbverify_shadows()
       '  y = builtin(''NAME'', x);'
       'end'});
   end
+  write(folder, 'system', { ...
+    'function [status, text] = NAME(command, varargin)'
+    '  if (nargout > 1 || nargin > 1)'
+    '    [status, text] = builtin(''NAME'', command, varargin{:});'
+    '  else'
+    '    [status, text] = builtin(''NAME'', command, true);'
+    '    puts(text);'
+    '  end'
+    'end'});
   for kind = {'double', 'logical'}
     own = fullfile(folder, ['@', kind{1}]);
     mkdir(own);
