@@ -16,7 +16,14 @@ function mbverify_host(path)
   %     eq.equations = {struct('number', '(3)', 'gives', 'leg1', 'function', @eq3, …)};
   %   end
   %
-  % Several forms in one file: a cell of such structures. SI units and radians.
+  % Several forms in one file: a cell of such structures. SI units and radians. p is a structure of
+  % the model's parameters (at the first calls one that notes which are read), q, qd, qdd are columns,
+  % load is a structure array (loads_of, below).
+  %
+  % drives and outputs are called with numbers that carry derivatives (mbverify_series). Those do not
+  % go into elements of arrays of plain numbers: v = [1; 2]; v(1) = x fails; v = zeros(2, 1); v(1) = x,
+  % v = [x; 2] and cells work. `for e = v`, arrayfun, interp1 and functions that ask for the class
+  % double do not take them.
   global mbverify_depth mbverify_read
   page_screen_output(false);
   beep_on_error(false);
@@ -105,7 +112,6 @@ function host = load_file(host, path)
   % A file before the newest of that name may still be known.
   clear(name);
   addpath(folder);
-  rehash();
   try
     given = feval(name);
   catch failure

@@ -245,7 +245,7 @@ classdef mbverify_series
       if (any(bad(:)))
         error('mbverify:unreachable', 'a broken power of a negative number');
       end
-      if (any(mbverify_value(x)(:) == 0))
+      if (has_zero(x))
         error('mbverify:singular', 'a broken power of 0 has no derivative');
       end
       f = x.a .^ n;
@@ -282,7 +282,7 @@ classdef mbverify_series
       end
       nil = mbverify_value(f) == 0;
       if (any(nil(:)))
-        if (isobject(x.a) || any((x.b .* nil)(:)) || any((x.c .* nil)(:)))
+        if (isobject(x.a) || any(any(any(x.b .* nil))) || any(any(x.c .* nil)))
           error('mbverify:singular', 'the root of 0 has no derivative');
         end
         g = f;
@@ -418,7 +418,7 @@ classdef mbverify_series
       % With D = x^2 + y^2: angle' = (x y' - y x') / D.
       [y, x] = aligned(y, x);
       D = x.a .* x.a + y.a .* y.a;
-      if (any(mbverify_value(D)(:) == 0))
+      if (has_zero(D))
         error('mbverify:singular', 'atan2(0, 0) has no derivative');
       end
       s = x;
@@ -432,7 +432,7 @@ classdef mbverify_series
       [x, y] = aligned(x, y);
       s = x;
       f = sqrt(x.a .* x.a + y.a .* y.a);
-      if (any(mbverify_value(f)(:) == 0))
+      if (has_zero(f))
         error('mbverify:singular', 'hypot(0, 0) has no derivative');
       end
       xb = x.b;
@@ -510,7 +510,7 @@ classdef mbverify_series
         first = mbverify_value(x) >= mbverify_value(y);
         s = x .* first + y .* ~first;
       else
-        [~, k] = max(mbverify_value(x)(:));
+        [~, k] = max(reshape(mbverify_value(x), [], 1));
         s = part(x, k);
       end
     end
@@ -520,7 +520,7 @@ classdef mbverify_series
         first = mbverify_value(x) <= mbverify_value(y);
         s = x .* first + y .* ~first;
       else
-        [~, k] = min(mbverify_value(x)(:));
+        [~, k] = min(reshape(mbverify_value(x), [], 1));
         s = part(x, k);
       end
     end
@@ -670,7 +670,7 @@ classdef mbverify_series
       [x, y] = aligned(x, y);
       [m, n] = size(x);
       [p, q] = size(y);
-      x = part(x, repmat(reshape(1:m, 1, m), p, 1)(:), repmat(reshape(1:n, 1, n), q, 1)(:));
+      x = part(x, ceil((1:m * p) / p), ceil((1:n * q) / q));
       s = x .* repmat(y, m, n);
     end
 
@@ -923,7 +923,7 @@ classdef mbverify_series
     end
 
     function disp(x)
-      printf('with derivatives: ');
+      fprintf('with derivatives: ');
       disp(mbverify_value(x));
     end
 
@@ -961,7 +961,7 @@ classdef mbverify_series
 
     function s = inverse(y)
       a = y.a;
-      if (any(mbverify_value(a)(:) == 0))
+      if (has_zero(a))
         error('mbverify:singular', 'division by zero');
       end
       r = 1 ./ a;
@@ -1115,7 +1115,7 @@ function [first, second] = arc_derivatives(x)
   v = mbverify_value(x);
   demand_real('the arc', v, abs(v) > 1);
   s = 1 - x .* x;
-  if (any(mbverify_value(s)(:) == 0))
+  if (has_zero(s))
     error('mbverify:singular', 'the arc of 1 has no derivative');
   end
   first = 1 ./ real_sqrt(s);
@@ -1153,6 +1153,11 @@ function s = series_of(parts)
       return
     end
   end
+end
+
+function t = has_zero(x)
+  v = mbverify_value(x);
+  t = any(v(:) == 0);
 end
 
 % The derivatives by the first variable.
