@@ -1,7 +1,7 @@
 """Drive angles and torques of a delta robot, by virtual work.
 
-Arm i turns about y of its frame, whose x axis points outwards at `azimuth`, by the angle theta below
-the horizontal. Both rods of a pair point along n, as the platform does not turn.
+Arm i turns about y of its frame, whose x axis points outwards at an azimuth, by the angle theta
+below the horizontal. Both rods of a pair point along n, as the platform does not turn.
 """
 
 from mbverify.equations import (Vec, acos, atan2, closed_form, cos, dot, hypot, jacobian,
@@ -23,7 +23,7 @@ def drives(p, x, y, z):
 
 @closed_form.forces
 def forces(p, q, qd, qdd):
-    def places(x, y, z):  # platform, then of each limb: the arm's centre, the rods', their direction
+    def places(x, y, z):  # the platform; of each limb the arm's and rods' centres, n
         found = [Vec(x, y, z)]
         for frame, theta in zip(FRAMES, drives(p, x, y, z)):
             arm = frame @ Vec(cos(theta), 0, -sin(theta))

@@ -4,7 +4,7 @@ function eq = planar_slider_crank()
   eq.commands = {'motor'};
   eq.drives = @(p, motor) motor;
   eq.forces = @forces;
-  eq.covers = 'unchecked';
+  eq.covers = @covers;
   eq.outputs = {'slider.x', 'm', @slider};
 end
 
@@ -20,6 +20,16 @@ function c = places(p, motor)  % of whatever has mass, and what turns
   x = p.r * cos(motor);
   y = p.r * sin(motor);
   c = [x / 2; y / 2; motor; x + p.l / 2 * cos(phi); y / 2; phi; x + p.l * cos(phi)];
+end
+
+function stated = covers(p)  % what the equations take for granted; NaN: of no influence
+  stated = {'gravity', [0, -p.g, NaN]; ...
+            'crank.mass', p.m_crank; 'crank.com', [p.r / 2, 0, NaN]; ...
+            'crank.inertia', [NaN, NaN, p.I_crank]; ...
+            'rod.mass', p.m_rod; 'rod.com', [p.l / 2, 0, NaN]; ...
+            'rod.inertia', [NaN, NaN, p.I_rod]; 'slider.mass', p.m_slider; ...
+            'motor.on_parent', [0, 0, 0]; 'pin.on_parent', [p.r, 0, 0]; ...
+            'wrist.on_parent', [p.l, 0, 0]; 'guide.on_parent', [0, 0, 0]; 'guide.axis', [1, 0, 0]};
 end
 
 function x = slider(p, motor)

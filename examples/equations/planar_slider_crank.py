@@ -9,7 +9,7 @@
 from mbverify.equations import asin, closed_form, cos, jacobian, motion, output, sin, sqrt
 
 
-@closed_form("planar_slider_crank", commands=["motor"], covers="unchecked")
+@closed_form("planar_slider_crank", commands=["motor"])
 def drives(p, motor):
     return [motor]
 
@@ -26,6 +26,19 @@ def forces(p, q, qd, qdd):
     along = jacobian(places, q)
     acceleration = motion(places, q, qd, qdd)[2]
     return [sum(k[0] * (i * a + w) for k, i, a, w in zip(along, inertia, acceleration, weight))]
+
+
+@closed_form.covers
+def covers(p):  # what the equations take for granted; None: of no influence
+    return {
+        "gravity": [0, -p.g, None],
+        "crank.mass": p.m_crank, "crank.com": [p.r / 2, 0, None],
+        "crank.inertia": [None, None, p.I_crank],
+        "rod.mass": p.m_rod, "rod.com": [p.l / 2, 0, None], "rod.inertia": [None, None, p.I_rod],
+        "slider.mass": p.m_slider,
+        "motor.on_parent": [0, 0, 0], "pin.on_parent": [p.r, 0, 0], "wrist.on_parent": [p.l, 0, 0],
+        "guide.on_parent": [0, 0, 0], "guide.axis": [1, 0, 0],
+    }
 
 
 @output("slider.x", "m")

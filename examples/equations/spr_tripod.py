@@ -5,8 +5,8 @@ the hinge c_i, which is fixed in the platform. A body with the centre of mass at
 principal moments I_k resists like masses (I_1 + I_2 + I_3)/2 - I_k at the tips of its axes.
 """
 
-from mbverify.equations import (Mat, Vec, closed_form, cos, cross, dot, jacobian, linear_solve, motion,
-                                norm, rot_x, rot_y, rot_z, sin, solve)
+from mbverify.equations import (Mat, Vec, closed_form, cos, cross, dot, jacobian, linear_solve,
+                                motion, norm, rot_x, rot_y, rot_z, sin, solve)
 
 
 def legs(p, r):

@@ -228,7 +228,8 @@ end
             self.assertAlmostEqual(b, values[1], delta=1e-14)
             self.assertAlmostEqual(2 * c, values[2], delta=1e-13)
         h = 1e-3
-        given = self.drives(["roots2(x)"], [(r + k * h, 1.0, 0.0) for k in (-2, -1, 0, 1, 2)], helpers)
+        points = [(r + k * h, 1.0, 0.0) for k in (-2, -1, 0, 1, 2)]
+        given = self.drives(["roots2(x)"], points, helpers)
         f = [values[0][0] for values in given]
         _, b, c = given[2][0]
         self.assertAlmostEqual(b, (f[0] - 8 * f[1] + 8 * f[3] - f[4]) / (12 * h), delta=1e-10)
@@ -485,7 +486,8 @@ end
             ("", "f = [1 1; 1 1] \\ [q; 1];", "singular", "singular", 10, "forces"),
             ("", "f = inv([1 1; 1 1]) * q;", "singular", "singular", 10, "forces"),
             ("", "f = q; error('my own');", "exception", "my own", 10, "forces"),
-            ("", "f = mbverify_jacobian(@(y) sqrt(y - 1), q);", "unreachable", "sqrt", 10, "forces"),
+            ("", "f = mbverify_jacobian(@(y) sqrt(y - 1), q);", "unreachable", "sqrt", 10,
+             "forces"),
         ]
         for drives, forces, kind, words, line, function in cases:
             with self.subTest(drives or forces):

@@ -1,13 +1,13 @@
 function mbverify_host(path)
-  % Answers mbverify's calls about one file of equations: a JSON text a line on standard input, one a
-  % line on standard output. What the file prints goes to standard error.
+  % Answers mbverify's calls about one file of equations: a JSON text a line on standard input, one
+  % a line on standard output. What the file prints goes to standard error.
   %
   % The file is a function without arguments that gives a structure of handles:
   %
   %   function eq = my_delta()
   %     eq.mechanism = 'my_delta';                       % the name in model.yaml
   %     eq.commands = {'platform.x', 'platform.y', 'platform.z'};
-  %     eq.drives = @drives;                             % drives(p, x, y, z): positions of all drives
+  %     eq.drives = @drives;                             % drives(p, x, y, z): all positions
   %     eq.forces = @forces;                             % forces(p, q, qd, qdd) or (…, load)
   %     eq.outputs = {'slider.x', 'm', @slider};         % rows: channel, unit, function of p, x, …
   %     eq.rates = @rates; eq.jacobian = @jac;           % rates(p, q, qd), jac(p, x, y, z)
@@ -17,13 +17,13 @@ function mbverify_host(path)
   %   end
   %
   % Several forms in one file: a cell of such structures. SI units and radians. p is a structure of
-  % the model's parameters (at the first calls one that notes which are read), q, qd, qdd are columns,
-  % load is a structure array (loads_of, below).
+  % the model's parameters (at the first calls one that notes which are read); q, qd, qdd are
+  % columns; load is a structure array (loads_of, below).
   %
-  % drives and outputs are called with numbers that carry derivatives (mbverify_series). Those do not
-  % go into elements of arrays of plain numbers: v = [1; 2]; v(1) = x fails; v = zeros(2, 1); v(1) = x,
-  % v = [x; 2] and cells work. `for e = v`, arrayfun, interp1 and functions that ask for the class
-  % double do not take them.
+  % drives and outputs are called with numbers that carry derivatives (mbverify_series). Those do
+  % not go into elements of arrays of plain numbers: v = [1; 2]; v(1) = x fails; v = zeros(2, 1);
+  % v(1) = x, v = [x; 2] and cells work. `for e = v`, arrayfun, interp1 and functions that ask for
+  % the class double do not take them.
   global mbverify_depth mbverify_read
   page_screen_output(false);
   beep_on_error(false);
@@ -161,8 +161,8 @@ function host = load_file(host, path)
 end
 
 function [form, info] = read_form(eq, source, text)
-  known = {'mechanism', 'commands', 'drives', 'forces', 'outputs', 'rates', 'jacobian', 'covers', ...
-           'states', 'equations'};
+  known = {'mechanism', 'commands', 'drives', 'forces', 'outputs', 'rates', 'jacobian', ...
+           'covers', 'states', 'equations'};
   for name = fieldnames(eq).'
     if (~any(strcmp(name{1}, known)))
       error('mbverify:host', 'there is no field ''%s''; known are %s', name{1}, ...
@@ -320,7 +320,8 @@ function found = functions_of(text)
   lines = strsplit(text, "\n", 'CollapseDelimiters', false);
   found = struct('name', {}, 'arguments', {}, 'line', {}, 'end', {});
   for k = 1:numel(lines)
-    t = regexp(lines{k}, '^\s*function\s+(?:[^=(]*=\s*)?(\w+)\s*(?:\(([^)]*)\))?', 'tokens', 'once');
+    t = regexp(lines{k}, '^\s*function\s+(?:[^=(]*=\s*)?(\w+)\s*(?:\(([^)]*)\))?', ...
+               'tokens', 'once');
     if (isempty(t))
       continue
     end
@@ -520,8 +521,8 @@ function text = sample_text(host, p, k, call)
   text = ['{', text, '}'];
 end
 
-% A structure array with name, body, axes ("world" or "body"), point (in the body's frame), force and
-% moment (about the point), columns of three.
+% A structure array with name, body, axes ("world" or "body"), point (in the body's frame), force
+% and moment (about the point), columns of three.
 function loads = loads_of(call)
   loads = struct('name', {}, 'body', {}, 'axes', {}, 'point', {}, 'force', {}, 'moment', {});
   if (~isfield(call, 'load') || isempty(call.load))
@@ -612,7 +613,8 @@ function text = with_all_given(host, call)
   lines = strsplit(text, "\n", 'CollapseDelimiters', false);
   if (~isempty(more) && ~isempty(source(k).arguments))
     given = strjoin([source(k).arguments, more], ', ');
-    lines{source(k).line} = regexprep(lines{source(k).line}, '\([^)]*\)', ['(', given, ')'], 'once');
+    lines{source(k).line} = regexprep(lines{source(k).line}, '\([^)]*\)', ['(', given, ')'], ...
+                                      'once');
     text = strjoin(lines, "\n");
   end
 end

@@ -1,6 +1,6 @@
 function J = mbverify_jacobian(f, q)
-  % Matrix of the derivatives of f(q(1), q(2), …): a row per element that f gives (matrices column by
-  % column), a column per element of q. An f of one argument is called with the vector q.
+  % Matrix of the derivatives of f(q(1), q(2), …): a row per element that f gives (matrices column
+  % by column), a column per element of q. An f of one argument is called with the vector q.
   global mbverify_depth
   before = mbverify_depth;
   level = max([before, mbverify_level(q)]) + 1;
@@ -11,7 +11,8 @@ function J = mbverify_jacobian(f, q)
   nought = builtin('zeros', n, 1);
   try
     if (level == 1)  % all columns at once
-      result = mbverify_call(f, mbverify_series(q, reshape(builtin('eye', n) + 0, n, 1, n), nought, 1));
+      along = reshape(builtin('eye', n) + 0, n, 1, n);
+      result = mbverify_call(f, mbverify_series(q, along, nought, 1));
       if (isa(result, 'mbverify_series'))
         J = reshape(result.b, numel(result), []);
         if (size(J, 2) < n)

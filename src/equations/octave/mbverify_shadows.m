@@ -8,7 +8,8 @@ function folder = mbverify_shadows()
   % Octave's own functions, which may count on the built-in ones, get these.
   folder = tempname();
   mkdir(folder);
-  octaves_own = 'isempty(strfind(evalin(''caller'', ''mfilename("fullpath")''), ''/share/octave/''))';
+  octaves_own = ['isempty(strfind(evalin(''caller'', ''mfilename("fullpath")''), ', ...
+                 '''/share/octave/''))'];
   for name = {'zeros', 'ones', 'eye'}
     write(folder, name{1}, { ...
       'function x = NAME(varargin)'
