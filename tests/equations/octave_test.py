@@ -158,6 +158,35 @@ class Derivatives(unittest.TestCase):
                 expected = s[2] * rate * rate + 0.5 * s[1] * acceleration
                 self.assertAlmostEqual(a[2], expected, delta=10 * size)
 
+    def test_of_several_variables(self):
+        # Value, rate, acceleration and both columns of the derivatives of f(u v), taken together.
+        body = "; ...\n".join(f"    one(@() {f})" for f in FUNCTIONS)
+        text = ("function eq = my_functions()\n  eq.mechanism = 'm';\n"
+                "  eq.drives = @(p, x) all_of(x);\n  eq.forces = @forces;\nend\n"
+                "function f = forces(p, q, qd, qdd)\n"
+                "  g = @(u, v) all_of(u * v);\n  at = [2; q / 2];\n"
+                "  [a, b, c, J] = mbverify_motion(g, at, [qd; 0.25], [0; qdd]);\n"
+                "  K = mbverify_jacobian(g, at);\n"
+                "  f = [a, b, c, J, K];\nend\n"
+                f"function d = all_of(x)\n  d = [ ...\n{body}];\nend\n"
+                "function y = one(f), y = f(); end\n" + HELPERS)
+        x, qd, qdd = 0.4, 1.5, -0.7
+        state = {"do": "sample", "form": 0, "q": [x], "qd": [qd], "qdd": [qdd]}
+        slope = {"do": "drives", "form": 0, "q": [x], "qd": [1.0], "qdd": [0.0]}
+        (_, _, sample, slopes), _ = answers(
+            "my_functions", text, {"do": "load"}, {"do": "set", "parameters": {}}, state, slope)
+        self.assertNotIn("error", sample)
+        u, v = 2, x / 2
+        rate, second = qd * v + 0.25 * u, 2 * qd * 0.25 + u * qdd
+        for k, name in enumerate(FUNCTIONS):
+            f, f1, half = slopes["values"][k]
+            given = sample["forces"][7 * k : 7 * k + 7]
+            expected = [f, f1 * rate, 2 * half * rate**2 + f1 * second, f1 * v, f1 * u, f1 * v, f1 * u]
+            with self.subTest(name):
+                size = 1e-12 * max(1, *map(abs, expected))
+                for a, b in zip(given, expected):
+                    self.assertAlmostEqual(a, b, delta=size)
+
     def test_nested(self):
         helpers = """
 function s = slope(x), s = mbverify_jacobian(@(y) y^3 + x*y, x); end
@@ -182,6 +211,10 @@ function s = constant(x), s = sum(mbverify_jacobian(@(y) [1; 2], x)) + x; end
 function s = root(x), s = mbverify_solve(@(y) y^3 + x*y - 1, 0.5); end
 function s = roots2(x)
   y = mbverify_solve(@(a, b) [a^2 + b^2 - 4*x; a - b*x], [1; 1]); s = y(1) + 2*y(2);
+end
+function s = motions(x)
+  [a, b, c, J] = mbverify_motion(@(u, v) [u * v * x; v^2], [x; 2], [1; 0], [0; 0]);
+  s = [1 1] * (a + b + c + J * [1; 1]);
 end
 function s = deep(x)
   s = mbverify_jacobian(@(u) mbverify_solve(@(y) y^3 + u*y - 1, 0.5), x);
@@ -212,6 +245,8 @@ end
                          12 * x * x + 90 * x + 48),
             "filled(x)": (2 * x * x + 3, 4 * x, 4),
             "constant(x)": (x, 1, 0),
+            # 2x² + 4, then 2x, 0, and [2x, x²; 0, 4] [1; 1]
+            "motions(x)": (3 * x * x + 4 * x + 8, 6 * x + 4, 6),
             "roots2(x)": None,
         }
         (given,) = self.drives(list(expected), [(x, 1.0, 0.0)], helpers)

@@ -320,7 +320,14 @@ function found = functions_of(text)
   lines = strsplit(text, "\n", 'CollapseDelimiters', false);
   found = struct('name', {}, 'arguments', {}, 'line', {}, 'end', {});
   for k = 1:numel(lines)
-    t = regexp(lines{k}, '^\s*function\s+(?:[^=(]*=\s*)?(\w+)\s*(?:\(([^)]*)\))?', ...
+    line = lines{k};
+    for n = k + 1:numel(lines)
+      if (isempty(regexp(line, '^\s*function.*\.\.\.\s*$', 'once')))
+        break
+      end
+      line = [regexprep(line, '\.\.\.\s*$', ''), lines{n}];
+    end
+    t = regexp(line, '^\s*function\s+(?:[^=(]*=\s*)?(\w+)\s*(?:\(([^)]*)\))?', ...
                'tokens', 'once');
     if (isempty(t))
       continue
