@@ -549,6 +549,44 @@ end
             self.assertIn(words, answer["error"]["message"])
             self.assertEqual(answer["error"]["line"], line)
 
+    def test_ways_to_write_a_file(self):
+        text = ("% A comment, and no end of functions.\n"
+                "function eq = my_way()\n"
+                "eq.mechanism = 'm';\neq.drives = @drives;\n"
+                "eq.outputs = {'a.x', 'm', @(p, left, right) left};\n"
+                "eq.equations = struct('number', {'(1)', '(2)'}, 'gives', 'g', ...\n"
+                "                      'function', {@first, @second});\n\n"
+                "function d = drives(p, left, ...  the one\n  right)\nd = {left, right};\n\n"
+                "% No argument but p.\nfunction x = first(p)\nx = 1;\n"
+                "function x = second(p, r)\nx = r;\n")
+        state = {"do": "drives", "form": 0, "q": [1, 2], "qd": [3, 4], "qdd": [6, 8]}
+        rows = [{"r": [1, 2]}, {"r": [3, 4]}]
+        for ends in ("\n", "\r\n"):
+            with self.subTest(ends=ends):
+                given, _ = answers(
+                    "my_way", text.replace("\n", ends), {"do": "load"},
+                    {"do": "set", "parameters": {}}, state,
+                    {"do": "equation", "index": 1, "rows": rows},
+                    {"do": "equation", "index": 0, "rows": [{}, {}]},
+                    {"do": "equation", "index": 1, "rows": [{}]})
+                form, (one, two) = given[0]["forms"][0], given[0]["equations"]
+                self.assertEqual(form["commands"], ["left", "right"])
+                self.assertEqual((form["line"], one["line"], one["end"]), (9, 14, 15))
+                self.assertEqual((two["line"], two["end"], two["arguments"]), (16, 17, ["r"]))
+                self.assertEqual(given[2], {"values": [[1, 3, 3], [2, 4, 4]]})
+                self.assertEqual(given[3], {"rows": [[1, 2], [3, 4]]})
+                self.assertEqual(given[4], {"rows": [[1], [1]]})
+                self.assertIn("'r'", given[5]["error"]["message"])
+
+    def test_several_forms(self):
+        text = ("function eqs = my_forms()\n  a.mechanism = 'm'; a.commands = {'x.y'};\n"
+                "  a.drives = @(p, x) x;\n  b = a; b.commands = {'w'}; b.drives = @(p, w) 2 * w;\n"
+                "  eqs = {a, b};\nend\n")
+        given, _ = answers("my_forms", text, {"do": "load"}, {"do": "set", "parameters": {}},
+                           {"do": "drives", "form": 1, "q": [1], "qd": [0], "qdd": [0]})
+        self.assertEqual([form["commands"] for form in given[0]["forms"]], [["x.y"], ["w"]])
+        self.assertEqual(given[2], {"values": [[2, 0, 0]]})
+
     def test_prints_do_not_disturb(self):
         answer, printed = self.sample(
             "disp(x); printf('one'); fprintf(1, 'two'); fdisp(stdout, 3); x, d = x;",

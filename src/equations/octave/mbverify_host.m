@@ -322,10 +322,10 @@ function found = functions_of(text)
   for k = 1:numel(lines)
     line = lines{k};
     for n = k + 1:numel(lines)
-      if (isempty(regexp(line, '^\s*function.*\.\.\.\s*$', 'once')))
+      if (isempty(regexp(line, '^\s*function.*\.\.\.', 'once')))
         break
       end
-      line = [regexprep(line, '\.\.\.\s*$', ''), lines{n}];
+      line = [regexprep(line, '\.\.\..*$', ''), lines{n}];
     end
     t = regexp(line, '^\s*function\s+(?:[^=(]*=\s*)?(\w+)\s*(?:\(([^)]*)\))?', ...
                'tokens', 'once');
