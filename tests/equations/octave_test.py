@@ -612,5 +612,47 @@ end
                                   "named_forces": {"left": 0.25, "right": 0.5}})
 
 
+
+@unittest.skipUnless(OCTAVE, "there is no octave-cli")
+class Examples(unittest.TestCase):
+    """What is written in both languages is the same."""
+
+    FOLDER = SOURCES.parents[1] / "examples" / "equations"
+
+    def check(self, name, parameters, middle, size):
+        random.seed(7)
+        calls = [{"do": "load"}, {"do": "set", "parameters": parameters}, {"do": "covers", "form": 0}]
+        for _ in range(20):
+            calls.append({"do": "sample", "form": 0, "load": [],
+                          "q": [m + size * random.uniform(-1, 1) for m in middle],
+                          "qd": [random.gauss(0, 1) for _ in middle],
+                          "qdd": [random.gauss(0, 5) for _ in middle]})
+        octave, _ = answers(name, (self.FOLDER / f"{name}.m").read_text(encoding="utf-8"), *calls)
+        python = python_answers((self.FOLDER / f"{name}.py").read_text(encoding="utf-8"), *calls)
+        for a, b in zip(python[2:], octave[2:]):
+            self.assertNotIn("error", a)
+            self.assertEqual(sorted(a), sorted(b))
+            for key in a:
+                if key == "stated":
+                    self.assertEqual(a[key], b[key])
+                    continue
+                x, y = ([e for row in t[key] for e in (row if isinstance(row, list) else [row])]
+                        for t in (a, b))
+                self.assertEqual(len(x), len(y))
+                for u, v in zip(x, y):
+                    self.assertAlmostEqual(u, v, delta=1e-13 * max(1, *map(abs, x)))
+
+    def test_slider_crank(self):
+        self.check("planar_slider_crank",
+                   {"r": 0.1, "l": 0.35, "m_crank": 0.8, "m_rod": 1.2, "m_slider": 2.5,
+                    "I_crank": 0.0009, "I_rod": 0.0125, "g": 9.81}, [0], 3)
+
+    def test_delta(self):
+        self.check("delta",
+                   {"R": 0.2, "r": 0.06, "L": 0.3, "l": 0.7, "m_arm": 0.65, "c_arm": 0.12,
+                    "I_arm": 0.0062, "m_rod": 0.11, "I_rod": 0.0051, "m_platform": 0.9, "g": 9.81},
+                   [0, 0, -0.7], 0.1)
+
+
 if __name__ == "__main__":
     unittest.main()
