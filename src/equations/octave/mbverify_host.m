@@ -30,9 +30,17 @@ function mbverify_host(path)
   warning('off', 'Octave:shadowed-function');
   warning('off', 'Octave:possible-matlab-short-circuit-operator');
   own = fileparts(mfilename('fullpath'));
-  shadows = mbverify_shadows();
+  % Started in the folder of these files, which is then mbverify's own, it leaves its files there.
+  if (strcmp(canonicalize_file_name(own), canonicalize_file_name(pwd())))
+    shadows = tempname(own);
+  else
+    shadows = tempname();
+  end
+  mkdir(shadows);
   tidy = onCleanup(@() remove(shadows));
+  mbverify_shadows(shadows);
   addpath(shadows);
+  host.scratch = shadows;
   % A solution by least squares in place of none is no answer.
   warning('error', 'Octave:singular-matrix');
   warning('error', 'Octave:nearly-singular-matrix');
@@ -582,7 +590,7 @@ end
 function text = try_source(host, call)
   % An edited text, in a folder of its own: Octave tells files apart by name and second. It may name
   % whatever is given, not the function's arguments alone.
-  folder = tempname();
+  folder = tempname(host.scratch);
   [~, name] = fileparts(host.path);
   mkdir(folder);
   file = fullfile(folder, [name, '.m']);

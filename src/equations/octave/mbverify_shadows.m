@@ -1,13 +1,11 @@
-function folder = mbverify_shadows()
-  % Writes functions that stand in place of built-in ones, in a folder of their own:
+function mbverify_shadows(folder)
+  % Writes functions that stand in place of built-in ones into a folder:
   % * where derivatives are taken, zeros, ones and eye give arrays that can take numbers with
   %   derivatives (Octave cannot assign these to elements of plain arrays);
   % * roots, logarithms and arcs of real numbers are real, or end the computation;
   % * what programs print that the file starts goes where its own prints go;
   % * rows of plain numbers in a matrix with others that carry derivatives: Octave asks for horzcat.
   % Octave's own functions, which may count on the built-in ones, get these.
-  folder = tempname();
-  mkdir(folder);
   octaves_own = ['isempty(strfind(evalin(''caller'', ''mfilename("fullpath")''), ', ...
                  '''/share/octave/''))'];
   for name = {'zeros', 'ones', 'eye'}
