@@ -68,7 +68,6 @@ function mbverify_host(path)
 end
 
 function remove(folder)
-  rmpath(folder);
   confirm_recursive_rmdir(false, 'local');
   rmdir(folder, 's');
 end
@@ -117,18 +116,15 @@ function host = load_file(host, path)
     error('mbverify:host', ...
           '''%s'' is no name of a function: letters, digits and _ alone', name);
   end
-  % A file before the newest of that name may still be known.
+  % The file and its edited texts have one name: the folder of the one that is meant comes first, and
+  % what was read before is forgotten.
+  persistent first
+  if (~strcmp(first, folder))
+    addpath(folder);
+    first = folder;
+  end
   clear(name);
-  addpath(folder);
-  try
-    given = feval(name);
-  catch failure
-    rmpath(folder);
-    rethrow(failure);
-  end
-  if (~strcmp(folder, fileparts(host.path)))
-    rmpath(folder);
-  end
+  given = feval(name);
   if (isstruct(given))
     given = num2cell(given);
   end
@@ -588,11 +584,13 @@ function text = equation_text(host, p, k, call)
 end
 
 function text = try_source(host, call)
-  % An edited text, in a folder of its own: Octave tells files apart by name and second. It may name
-  % whatever is given, not the function's arguments alone.
-  folder = tempname(host.scratch);
+  % An edited text, in a folder of its own. It may name whatever is given, not the function's
+  % arguments alone.
+  folder = fullfile(host.scratch, 'edited');
+  if (~exist(folder, 'dir'))
+    mkdir(folder);
+  end
   [~, name] = fileparts(host.path);
-  mkdir(folder);
   file = fullfile(folder, [name, '.m']);
   id = fopen(file, 'w');
   fputs(id, with_all_given(host, call));
@@ -603,8 +601,6 @@ function text = try_source(host, call)
   catch failure
     text = json(struct('failed', failure.message));
   end
-  delete(file);
-  rmdir(folder);
 end
 
 function text = with_all_given(host, call)
