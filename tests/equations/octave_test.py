@@ -606,6 +606,22 @@ end
                                         "  y = zeros(1, 1); y(1) = p.r * x;\nend\n"}, times=12)
         self.assertEqual(answer, {"values": [[0.5, 2, 0]], "forces": [0.5]})
 
+    def test_parameters_are_a_structure(self):
+        text = self.FILE.replace("DRIVES", "p.k = 2 * p.r; q.p = p; d = half(q) * x;").replace(
+            "FORCES", "f = q * getfield(p, 'r') + isstruct(p) + isfield(p, 'none') + p.('r');")
+        text += "function k = half(q), k = q.p.k / 2; end\n"
+        state = {"do": "sample", "form": 0, "q": [0.25], "qd": [1.0], "qdd": [0.0]}
+        given, _ = answers("my_try", text, {"do": "load"},
+                           {"do": "set", "parameters": {"r": 2.0, "s": 1.0}}, {"do": "read"},
+                           *[state] * 12, {"do": "read"}, {"do": "set", "parameters": {"r": 3}},
+                           state, {"do": "set", "parameters": {}}, {"do": "read"})
+        self.assertEqual(given[2], {"names": []})
+        for answer in given[3:15]:
+            self.assertEqual(answer, {"values": [[0.5, 2, 0]], "forces": [3.5]})
+        self.assertEqual(given[15], {"names": ["r"]})
+        self.assertEqual(given[17], {"values": [[0.75, 3, 0]], "forces": [4.75]})
+        self.assertEqual(given[19], {"names": []})
+
     def test_names_of_drives(self):
         answer, _ = self.sample("d.left = x^2; d.right = 3;", "f.left = q; f.right = 2*q;")
         self.assertEqual(answer, {"named": {"left": [0.0625, 0.5, 1], "right": [3, 0, 0]},

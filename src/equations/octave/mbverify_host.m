@@ -87,7 +87,7 @@ function [host, text] = answered(host, line)
         host = set_parameters(host, call.parameters);
         text = '{}';
       case 'read'
-        text = read_names();
+        text = read_names(host);
       case 'covers'
         text = covers(host, call.form + 1);
       case 'drives'
@@ -421,9 +421,11 @@ function [host, text] = tracked(host, kind, number, call, f)
   end
 end
 
-function text = read_names()
+function text = read_names(host)
   global mbverify_read
-  text = json(struct('names', {sort(fieldnames(mbverify_read)).'}));
+  names = sort(fieldnames(mbverify_read)).';
+  names = names(isfield(host.parameters, names));
+  text = json(struct('names', {names}));
 end
 
 % Calls.

@@ -25,8 +25,8 @@ classdef mbverify_parameters
       end
     end
 
-    function subsasgn(~, ~, ~)
-      error('mbverify:parameters', 'parameters are the model''s; they cannot be set');
+    function p = subsasgn(p, index, x)
+      p.values = subsasgn(p.values, index, x);  % of the function's own copy
     end
 
     function t = isstruct(~)
