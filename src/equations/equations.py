@@ -77,7 +77,11 @@ class Series:
             return None
         return self, Series(other, 0.0, 0.0, self.level)
 
+    # Plain numbers, which are most, take the short way.
+
     def __add__(self, other):
+        if type(other) is float or type(other) is int:
+            return Series(self.a + other, self.b, self.c, self.level)
         pair = self._pair(other)
         if pair is None:
             return NotImplemented
@@ -93,6 +97,8 @@ class Series:
         return self
 
     def __sub__(self, other):
+        if type(other) is float or type(other) is int:
+            return Series(self.a - other, self.b, self.c, self.level)
         pair = self._pair(other)
         if pair is None:
             return NotImplemented
@@ -103,6 +109,8 @@ class Series:
         return (-self) + other
 
     def __mul__(self, other):
+        if type(other) is float or type(other) is int:
+            return Series(self.a * other, self.b * other, self.c * other, self.level)
         pair = self._pair(other)
         if pair is None:
             return NotImplemented
@@ -584,10 +592,11 @@ def solve(function, start, iterations=50):
     """x with function(*x) = 0, by Newton's method from `start` (numbers); with the derivatives of x
     by whatever the function depends on."""
     x = [float(value(e)) for e in start]
-    size = 1e-300
+    size, largest = 1e-300, math.inf
     for _ in range(iterations):
         residual = [value(e) for e in _flat(function(*x))]
-        J = value(jacobian(function, x))
+        if largest > 1e-4 * size:  # else the matrix is near enough
+            J = value(jacobian(function, x))
         try:
             step = linear_solve(J, residual)
         except ZeroDivisionError:
@@ -597,18 +606,16 @@ def solve(function, start, iterations=50):
         if not math.isfinite(largest):
             break
         size = max([size] + [abs(e) for e in x])
-        if largest <= 4e-16 * size:
-            break
-        if largest <= 1e-9 * size:  # the next step is round-off
-            x = [a - b for a, b in zip(x, linear_solve(J, [value(e) for e in _flat(function(*x))]))]
+        if largest <= 1e-14 * size:  # the next step is round-off
             break
     else:
         largest = math.inf
     if not math.isfinite(largest) or any(not math.isfinite(e) for e in x):
         raise Unreachable(f"solve: no root after {iterations} steps from {list(value(start))}")
     # Each step with the same matrix gives one more coefficient of the series.
-    J = value(jacobian(function, x))
     order = 2 * _level(function(*x))
+    if order:
+        J = value(jacobian(function, x))
     for _ in range(order):
         x = [a - b for a, b in zip(x, linear_solve(J, _flat(function(*x))))]
     return Vec(x)

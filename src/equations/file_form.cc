@@ -138,7 +138,8 @@ class FileClosedForm final : public ClosedForm {
     const std::vector<std::string> read = equations_->ReadParameters();
     std::vector<std::string> unread;
     for (const auto& [name, value] : parameters_) {
-      if (!Contains(read, name)) unread.push_back(name);
+      // Those of instances ("leg1.phi") only place what a part is.
+      if (name.find('.') == std::string::npos && !Contains(read, name)) unread.push_back(name);
     }
     return unread;
   }

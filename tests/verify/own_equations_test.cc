@@ -4,8 +4,10 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 
 #include "base/files.h"
+#include "base/worker_pool.h"
 #include "features/run/run_scenario.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_folder.h"
@@ -130,6 +132,42 @@ TEST_F(OwnEquations, RunAfterConsentOnly) {
   EXPECT_EQ(ProgramsOf(file, {}).Lines().size(), 1u);
   EXPECT_EQ(Run(file, false).exit_code, 0);
   EXPECT_TRUE(ran());
+}
+
+// What examples/equations/ shows: four mechanisms, in Python and partly in Octave.
+TEST(OwnEquationsExamples, AgreeInFortyLines) {
+  size_t ran = 0;
+  for (const auto& entry : fs::directory_iterator(SourcePath("/examples/equations"))) {
+    const std::string file = entry.path().string();
+    const bool octave = file.ends_with(".m");
+    if (!octave && !file.ends_with(".py")) continue;
+    if (octave && !FindProgram("octave-cli")) continue;
+    size_t lines = 0;
+    std::istringstream text(ReadWholeFile(file).value());
+    bool quoted = false;
+    for (std::string line; std::getline(text, line);) {
+      const size_t first = line.find_first_not_of(' ');
+      const bool quotes = line.find("\"\"\"") != std::string::npos;
+      const bool one_line = quotes && line.find("\"\"\"") != line.rfind("\"\"\"");
+      const bool comment = first == std::string::npos || line[first] == '#' || line[first] == '%';
+      if (!comment && !quoted && !quotes) ++lines;
+      if (quotes && !one_line) quoted = !quoted;
+    }
+    EXPECT_LE(lines, 40u) << file;
+    RunOptions options;
+    options.programs.all = true;
+    options.scenario.set = {{"analytic.equations", fs::path(file).filename().string()}};
+    fs::path scenario = entry.path();
+    const RunOutcome outcome = RunScenario(scenario.replace_extension(".yaml").string(), options);
+    ASSERT_TRUE(outcome.report) << file << outcome.diagnostics.Text();
+    const Comparison& comparison = outcome.report->comparison;
+    EXPECT_EQ(comparison.verdict, Verdict::kAgree) << file << comparison.reason;
+    const PairComparison* pair = comparison.FindPair("reference_vs_analytic");
+    ASSERT_NE(pair, nullptr) << file;
+    EXPECT_LT(pair->metrics.at(Metric::kForceNrmse).value, 1e-10) << file;
+    ++ran;
+  }
+  EXPECT_GE(ran, 4u);
 }
 
 // Formulas are no program.
