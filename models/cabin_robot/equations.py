@@ -3,17 +3,17 @@
 Liu Y., Yao J., Guo Y., Yi W., Zhao Y.: Design and analysis of hybrid cabin assembly attitude
 adjustment robot system. Journal of National University of Defense Technology 47 (2), 2025, 131–145.
 
-α is the angle of AB, β and ε are the interior angles at D and F (the joints' are π − β, π − ε), γ the
-platform's tilt. V0 = Ẋ1, V2 = Ẋ3 − Ẋ1 (slider F), V3 = Ẋ2 − Ẋ1 (slider D). The section on the wrist
-has symbols of its own: θ1, θ2, d2, θ3, a1, a2, d3 for th3, th4, d5, th6, a3, a4, d6. Its stiffness,
-(54)–(75), is audited elsewhere.
+α is the angle of AB, β and ε are the interior angles at D and F (the joints' are π − β and π − ε),
+γ is the tilt of the platform; V0 = Ẋ1, V2 = Ẋ3 − Ẋ1 (slider F), V3 = Ẋ2 − Ẋ1 (slider D). The section
+on the wrist has symbols of its own: θ1, θ2, d2, θ3, a1, a2, d3 for th3, th4, d5, th6, a3, a4, d6.
+The stiffness, (54)–(75), is audited elsewhere.
 """
 
 from functools import lru_cache
 
 from mbverify.equations import (
-    Mat, Vec, acos, asin, atan2, cos, cross, dot, equation, hypot, jacobian, linear_solve, motion, pi,
-    rot_x, rot_z, sin, sqrt, states, unreachable, vee,
+    Mat, Vec, acos, asin, atan2, cos, cross, dot, equation, hypot, jacobian, linear_solve, motion,
+    pi, rot_x, rot_z, sin, sqrt, states, unreachable, vee,
 )
 
 FORCE, MOMENT = [60, -80, 100], [5, -4, 3]  # on the end effector, at its origin
@@ -524,7 +524,7 @@ def _(p, th3, th4, d5, th6, th3_d, th4_d, d5_d, th6_d, th3_dd, th4_dd, d5_dd, th
     return Vec(A[:3]) + cross(V[3:], V[:3]) + carried(R, r, v, v_K, a_K, w_K, e_K)
 
 
-# Planar velocities, relative to slider A: of the reference's, in the axes of links, V0 is taken off.
+# Planar velocities are relative to slider A; the reference's contain V0.
 
 
 @equation("(14)", gives="F", given=ANGLES, unit="rad", printed="ε = asin(L1 sin α/(2 L4))",
@@ -536,7 +536,8 @@ def eq14(p, A):
 
 
 @equation("(15)", gives="AB.E.velocity in EF[1]", given=ANGLES, unit="m/s",
-          printed="V_EF = V2 cos ε", note="along FE, with slider A; V2 is the speed of F relative to A")
+          printed="V_EF = V2 cos ε",
+          note="along FE, with slider A; V2 is the speed of F relative to A")
 def eq15(p, F, X1_d, X3_d):
     epsilon, V0, V2 = pi - F, X1_d, X3_d - X1_d
     V_EF = V2 * cos(epsilon)
@@ -921,7 +922,8 @@ def eq47(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
          d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
          d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
     k = DRIVES.index(drive)
-    q, q_d = (d1, X1, X2, X3, th3, th4, d5, th6), (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
+    q = (d1, X1, X2, X3, th3, th4, d5, th6)
+    q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, (*PLANAR, *WRIST_BODIES), q, q_d, q_dd)
     return tau[k] - J.T[k] @ Vec(MOMENT + FORCE)
@@ -932,7 +934,8 @@ def _(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
       d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
       d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
     k = DRIVES.index(drive)
-    q, q_d = (d1, X1, X2, X3, th3, th4, d5, th6), (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
+    q = (d1, X1, X2, X3, th3, th4, d5, th6)
+    q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
     return tau[k] - J.T[k] @ Vec(MOMENT + FORCE)
@@ -945,7 +948,8 @@ def eq48(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
          d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
          d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
     k = DRIVES.index(drive)
-    q, q_d = (d1, X1, X2, X3, th3, th4, d5, th6), (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
+    q = (d1, X1, X2, X3, th3, th4, d5, th6)
+    q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
     return tau[k] - J.T[k] @ Vec(MOMENT + FORCE)
@@ -959,7 +963,8 @@ def eq53(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
          d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
          d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
     k = DRIVES.index(drive)
-    q, q_d = (d1, X1, X2, X3, th3, th4, d5, th6), (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
+    q = (d1, X1, X2, X3, th3, th4, d5, th6)
+    q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
     return tau[k] + (J.T @ Vec(MOMENT + FORCE))[k]
@@ -970,7 +975,8 @@ def _(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
       d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
       d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
     k = DRIVES.index(drive)
-    q, q_d = (d1, X1, X2, X3, th3, th4, d5, th6), (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
+    q = (d1, X1, X2, X3, th3, th4, d5, th6)
+    q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
     return tau[k] - (J.T @ Vec(MOMENT + FORCE))[k]

@@ -1,11 +1,11 @@
-"""The equations of the 3-SPR paper, as printed and as they should be, and their extension to forces.
+"""The equations of the 3-SPR paper, as printed and as they should be, and an extension to forces.
 
 Mei J., Gao B., Tan Y., Wang L.: Kinematic Analysis of 3-SPR Parallel Mechanism. Transactions of the
 Chinese Society for Agricultural Machinery 43 (8), 2012, 215–220.
 
-Names are the paper's: r, v of O_A; R = [u v w] of the platform; a_i = R (platform's hinge A_i), also
-written r_i; b_i of the base's ball B_i; c_i the hinge's axis; w_i from B_i to A_i; q_i = |B_i A_i|.
-World axes. Random states as in docs/results/equation_audit.md: centres of mass beside the axes,
+Names are the paper's: r, v of O_A; R = [u v w] of the platform; a_i from O_A to the hinge A_i, also
+written r_i; b_i from O_B to the ball B_i; c_i the hinge's axis; w_i from B_i to A_i; q_i the leg's
+length; world axes. The states are as on the page of the audit: centres of mass beside the axes,
 inclined gravity, a load on the platform.
 """
 
