@@ -5,8 +5,8 @@ adjustment robot system. Journal of National University of Defense Technology 47
 
 α is the angle of AB, β and ε are the interior angles at D and F (the joints' are π − β and π − ε),
 γ is the tilt of the platform; V0 = Ẋ1, V2 = Ẋ3 − Ẋ1 (slider F), V3 = Ẋ2 − Ẋ1 (slider D). The
-section on the wrist has symbols of its own: θ1, θ2, d2, θ3, a1, a2, d3 for th3, th4, d5, th6, a3, a4, d6.
-The stiffness, (54)–(75), is audited elsewhere.
+section on the wrist has symbols of its own: θ1, θ2, d2, θ3, a1, a2, d3 for th3, th4, d5, th6, a3,
+a4, d6. The stiffness, (54)–(75), is audited elsewhere.
 """
 
 from functools import lru_cache

@@ -3,10 +3,10 @@
 Zhu W., Guo Q., Ma Z., Shen H., Wu G.: Stiffness and dynamics analysis of SCARA parallel mechanism.
 Transactions of the Chinese Society for Agricultural Machinery 50 (10), 2019.
 
-X = (x, y, z, φ) of the platform, φ its yaw; θ_i of the motors. u_i along the arm, n_i = ν_i × u_i with
-the motor's axis ν_i; η_i along the rods: v_i of limbs 1, 2, w_i of limbs 3, 4; s_i from P to B_i, k_i
-its derivative by φ; V_i = η_i·n_i. The bars are massless, as in the paper. The stiffness, (11)–(21),
-is audited elsewhere.
+X = (x, y, z, φ) of the platform, φ its yaw; θ_i of the motors. u_i along the arm, n_i = ν_i × u_i
+with the motor's axis ν_i; η_i along the rods: v_i of limbs 1, 2, w_i of limbs 3, 4; s_i from P to
+B_i, k_i its derivative by φ; V_i = η_i·n_i. The bars are massless, as in the paper. The stiffness,
+(11)–(21), is audited elsewhere.
 """
 
 from mbverify.equations import (
@@ -28,7 +28,8 @@ states(
 )
 
 LIMBS, FIRST, LAST = {"i": [1, 2, 3, 4]}, {"i": [1, 2]}, {"i": [3, 4]}
-RODS = {"rod": ["limb1.rod_a", "limb1.rod_b", "limb2.rod_a", "limb2.rod_b", "limb3.rod", "limb4.rod"]}
+RODS = {"rod": ["limb1.rod_a", "limb1.rod_b", "limb2.rod_a", "limb2.rod_b", "limb3.rod",
+                "limb4.rod"]}
 COMPONENTS = {"c": ["x", "y", "z", "yaw"]}
 THETA = {f"t{i}": f"limb{i}.drive" for i in LIMBS["i"]}
 THETA_D = {f"t{i}_d": f"limb{i}.drive.velocity" for i in LIMBS["i"]}
@@ -284,7 +285,8 @@ def _(p, i, x, y, z, yaw):
 @equation("(24)", gives="platform.limb{i}.B.velocity", each=FIRST, unit="m/s",
           given={"theta": "limb{i}.drive", "theta_d": "limb{i}.drive.velocity",
                  "epsilon": "limb{i}.rod_a.angular_velocity", "R_rod": "limb{i}.rod_a.rotation"},
-          printed="ṗ + ṡ_i = l1 θ̇_i (ν_i u_i) + l2 ε_i v_i", note="the cross signs are lost in print")
+          printed="ṗ + ṡ_i = l1 θ̇_i (ν_i u_i) + l2 ε_i v_i",
+          note="the cross signs are lost in print")
 def eq24(p, i, theta, theta_d, epsilon, R_rod):
     u_i = cos(theta) * radial(i) - Vec(0, 0, sin(theta))
     v_i = R_rod @ Vec(1, 0, 0)
@@ -294,7 +296,8 @@ def eq24(p, i, theta, theta_d, epsilon, R_rod):
 @equation("(25)", gives="platform.limb{i}.B.velocity", each=LAST, unit="m/s",
           given={"theta": "limb{i}.drive", "theta_d": "limb{i}.drive.velocity",
                  "omega": "limb{i}.rod.angular_velocity", "R_rod": "limb{i}.rod.rotation"},
-          printed="ṗ + ṡ_i = l1 θ̇_i (ν_i u_i) + l3 ω_i w_i", note="the cross signs are lost in print")
+          printed="ṗ + ṡ_i = l1 θ̇_i (ν_i u_i) + l3 ω_i w_i",
+          note="the cross signs are lost in print")
 def eq25(p, i, theta, theta_d, omega, R_rod):
     u_i = cos(theta) * radial(i) - Vec(0, 0, sin(theta))
     w_i = R_rod @ Vec(1, 0, 0)
@@ -549,8 +552,8 @@ def _(p, i, theta, theta_d, t1_d, t2_d, t3_d, t4_d):
 
 
 @equation("(32)", gives="limb{i}.arm.limb{i}.C.velocity", each=LIMBS, unit="m/s",
-          given={"v_i1": "limb{i}.arm.com.velocity"}, printed="v_C = v_i1", corrected="v_C = 2 v_i1",
-          note="the tip moves twice as fast as the middle")
+          given={"v_i1": "limb{i}.arm.com.velocity"}, printed="v_C = v_i1",
+          corrected="v_C = 2 v_i1", note="the tip moves twice as fast as the middle")
 def eq32(p, v_i1):
     return v_i1
 
@@ -574,7 +577,8 @@ MIDDLE = {"v_C": "limb{i}.arm.limb{i}.C.velocity", "v_B": "platform.limb{i}.B.ve
 
 @equation("(34) v_i2", gives="limb{i}.rod_a.limb{i}.middle.velocity", each=FIRST, unit="m/s",
           given={**MIDDLE, "v_b": "limb{i}.rod_b.limb{i}.middle.velocity"},
-          printed="v_i2 = ½ (v_C + v_D)", note="mean of both rods, less that of rod b; v_C corrected")
+          printed="v_i2 = ½ (v_C + v_D)",
+          note="mean of both rods, less that of rod b; v_C corrected")
 def eq34_v(p, v_C, v_B, v_b):
     v_D = v_B
     v_i2 = (v_C + v_D) / 2
@@ -869,8 +873,8 @@ TORQUES = {f"M{i}": f"limb{i}.drive.force" for i in LIMBS["i"]}
 @equation("(46)", gives="0", given={**MOTION, **TORQUES}, unit="W",
           printed="Mᵀδθ + Fᵀδ(x, y, z) + Qᵀδ(x, y, z) + Σ(Qᵀδx + Tᵀδϑ) = 0",
           corrected="δX = (δx, δy, δz, δφ), with M_z − I_pz φ̈ about z and (42) corrected",
-          note="the motion as virtual motion; as printed δX has three components, but is multiplied "
-          "with 4-column matrices")
+          note="the motion as virtual motion; as printed δX has three components, but is "
+          "multiplied with 4-column matrices")
 def eq46(p, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd, t1, t2, t3, t4,
          t1_d, t2_d, t3_d, t4_d, t1_dd, t2_dd, t3_dd, t4_dd, M1, M2, M3, M4):
     theta, theta_d = Vec(t1, t2, t3, t4), Vec(t1_d, t2_d, t3_d, t4_d)
@@ -925,11 +929,11 @@ def _(p, i, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
 
 @equation("(48)", gives="limb{j}.drive.force", each={"j": [1, 2, 3, 4]}, given=MOTION, unit="N m",
           printed="M = (Σ m_ij J_ijᵀ − m_p Jᵀ ẑ) g + […] Ẋ + […] Ẍ",
-          corrected="M = J⁻ᵀ{[m_p (p̈ − g); I_pz φ̈] − [F; M_z]} + Σ{J_i1ᵀ m_i1 (v̇_i1 − g) + I θ̈_i "
-          "Φ_i + J_i2ᵀ m_i2 (v̇_i2 − g) + J_ωiᵀ [I ω̇ + ω × I ω]}",
-          note="printed in its most generous reading (J⁻¹ for J, no factor θ_i): no external force, "
-          "no inertia of the platform, weights of links and platform against each other, arms' "
-          "inertia with the wrong sign, no ω × Iω")
+          corrected="M = J⁻ᵀ{[m_p (p̈ − g); I_pz φ̈] − [F; M_z]} + Σ{J_i1ᵀ m_i1 (v̇_i1 − g) + "
+          "I θ̈_i Φ_i + J_i2ᵀ m_i2 (v̇_i2 − g) + J_ωiᵀ [I ω̇ + ω × I ω]}",
+          note="printed in its most generous reading (J⁻¹ for J, no factor θ_i): no external "
+          "force, no inertia of the platform, weights of links and platform against each other, "
+          "arms' inertia with the wrong sign, no ω × Iω")
 def eq48(p, j, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd, t1, t2, t3, t4,
          t1_d, t2_d, t3_d, t4_d, t1_dd, t2_dd, t3_dd, t4_dd):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
