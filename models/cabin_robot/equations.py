@@ -254,7 +254,6 @@ def _(p, R, t, th4):
 # (12), (13): elements of the end effector's pose; α is here the platform's tilt.
 
 TILT = {"alpha": "platform.yaw", "X": "platform.x", "Y": "platform.y"}
-CHAIN = "elements of the end effector's pose"
 
 
 @equation("(12), (13) n_x", gives="slewing.rotation[1,1]", given=TILT, printed="as printed")
