@@ -12,7 +12,7 @@ a4, d6. The stiffness, (54)–(75), is audited elsewhere.
 from functools import lru_cache
 
 from mbverify.equations import (
-    Mat, Vec, acos, asin, atan2, cos, cross, dot, equation, hypot, jacobian, linear_solve, motion,
+    Mat, Vec, acos, asin, atan2, cos, cross, dot, equation, hypot, jacobian, motion,
     pi, rot_x, rot_z, sin, sqrt, states, unreachable, vee,
 )
 
@@ -32,6 +32,12 @@ states(
                    "th6": 0.5},
     loads=[{"body": "slewing", "point": [0, 0, 0], "force": FORCE, "moment": MOMENT}],
 )
+
+
+def of(names, quantities):
+    """Those of the quantities that are named."""
+    return {name: quantities[name] for name in names.split()}
+
 
 # Planar linkage, position.
 
@@ -55,7 +61,7 @@ def eq1_epsilon(p, Y, gamma):
     return pi - epsilon
 
 
-@equation("(1) AF", gives="sliderF.position from sliderA[1]", given=ANGLES, unit="m",
+@equation("(1) AF", gives="sliderF.position from sliderA[1]", given=of("A F", ANGLES), unit="m",
           printed="AF = (L1/2) cos α + L4 cos ε")
 def eq1_AF(p, A, F):
     alpha, epsilon = A, pi - F
@@ -85,7 +91,7 @@ def _(p, X_C, X1, D):
     return X_C - X1 + p.L3 * cos(beta)
 
 
-@equation("(3), (4) X1", gives="X1", given={"X": "platform.x", **ANGLES}, unit="m",
+@equation("(3), (4) X1", gives="X1", given={"X": "platform.x", **of("A gamma", ANGLES)}, unit="m",
           printed="X1 = X_B − AH")
 def eq3_X1(p, X, gamma, A):
     alpha = A
@@ -93,7 +99,7 @@ def eq3_X1(p, X, gamma, A):
     return X_B - p.L1 * cos(alpha)
 
 
-@equation("(3), (4) X2", gives="X2", given={"X": "platform.x", **ANGLES}, unit="m",
+@equation("(3), (4) X2", gives="X2", given={"X": "platform.x", **of("D gamma", ANGLES)}, unit="m",
           printed="X2 = X_C + KD")
 def eq3_X2(p, X, gamma, D):
     beta = pi - D
@@ -101,20 +107,20 @@ def eq3_X2(p, X, gamma, D):
     return X_C + p.L3 * cos(beta)
 
 
-@equation("(3), (4) X3", gives="X3", given=ANGLES, unit="m", printed="X3 = X1 + AF")
+@equation("(3), (4) X3", gives="X3", given=of("A F", ANGLES), unit="m", printed="X3 = X1 + AF")
 def eq3_X3(p, X1, A, F):
     alpha, epsilon = A, pi - F
     AF = p.L1 / 2 * cos(alpha) + p.L4 * cos(epsilon)
     return X1 + AF
 
 
-@equation("(9) α", gives="A", given=SPANS, unit="rad",
+@equation("(9) α", gives="A", given={"AF": SPANS["AF"]}, unit="rad",
           printed="cos α = (L1²/4 + AF² − L4²)/(L1 AF)", note="X1, X2 of (9) read as AF and AD")
 def eq9_alpha(p, AF):
     return acos((p.L1**2 / 4 + AF**2 - p.L4**2) / (p.L1 * AF))
 
 
-@equation("(9) β1, β2, γ", gives="platform.yaw", given={**SPANS, "A": "A"}, unit="rad",
+@equation("(9) β1, β2, γ", gives="platform.yaw", given={"AD": SPANS["AD"], "A": "A"}, unit="rad",
           printed="sin β2 = L1 sin α/BD; cos β1 = (L3² + BD² − L2²)/(2 L3 BD); "
           "sin γ = (L3 sin β − L1 sin α)/L2", note="with β = β1 + β2")
 def eq9_gamma(p, AD, A):
@@ -126,8 +132,8 @@ def eq9_gamma(p, AD, A):
     return asin((p.L3 * sin(beta) - p.L1 * sin(alpha)) / p.L2)
 
 
-@equation("(9) β", gives="D", given={**SPANS, "A": "A"}, unit="rad", printed="not stated",
-          corrected="β = β1 + β2", note="the joint's angle is π − β")
+@equation("(9) β", gives="D", given={"AD": SPANS["AD"], "A": "A"}, unit="rad",
+          printed="not stated", corrected="β = β1 + β2", note="the joint's angle is π − β")
 def eq9_beta(p, AD, A):
     unreachable("the paper does not say what β is")
 
@@ -146,7 +152,7 @@ def BM_of(p, alpha, beta):
     return sqrt(p.L2**2 - (p.L3 * sin(beta) - p.L1 * sin(alpha))**2)
 
 
-@equation("after (9): C", gives="CD.C.position[1]", given=ANGLES, unit="m",
+@equation("after (9): C", gives="CD.C.position[1]", given=of("A D", ANGLES), unit="m",
           printed="C = (L1 cos α + BM, L3 sin β)", corrected="with X1 added to the abscissa",
           note="right only with the origin at A")
 def after9_C(p, X1, A, D):
@@ -160,7 +166,7 @@ def _(p, X1, A, D):
     return X1 + p.L1 * cos(alpha) + BM_of(p, alpha, beta)
 
 
-@equation("after (9): G", gives="platform.x", given=ANGLES, unit="m",
+@equation("after (9): G", gives="platform.x", given=of("A D", ANGLES), unit="m",
           printed="G = (L1 cos α + BM/2, …)", corrected="with X1 added to the abscissa",
           note="right only with the origin at A")
 def after9_G(p, X1, A, D):
@@ -177,7 +183,7 @@ def _(p, X1, A, D):
 # Wrist, from {3} at th3 = 0 without d3: axes of platform.wrist, {2} turned by −90° about x.
 
 BASE = rot_x(-pi / 2)
-WRIST = {"R": "slewing.rotation in platform", "t": "slewing.position from support in platform"}
+WRIST = {"R": "slewing.rotation in platform", "t": "slewing.position in platform from support"}
 
 
 def wrist_columns(R, t):
@@ -197,7 +203,7 @@ def eq6_rotation(p, th3, th4, th6):
     )
 
 
-@equation("(5), (6) p", gives="slewing.position from support in platform", unit="m",
+@equation("(5), (6) p", gives="slewing.position in platform from support", unit="m",
           printed="elements of the wrist's transform", note="turned into the platform's axes")
 def eq6_p(p, th3, th4, d5):
     a1, a2, d2, d3 = p.a3, p.a4, d5, p.d6
@@ -253,17 +259,17 @@ def _(p, R, t, th4):
 
 # (12), (13): elements of the end effector's pose; α is here the platform's tilt.
 
-TILT = {"alpha": "platform.yaw", "X": "platform.x", "Y": "platform.y"}
+ALPHA = {"alpha": "platform.yaw"}
 
 
-@equation("(12), (13) n_x", gives="slewing.rotation[1,1]", given=TILT, printed="as printed")
+@equation("(12), (13) n_x", gives="slewing.rotation[1,1]", given=ALPHA, printed="as printed")
 def eq13_nx(p, alpha, th3, th4, th6):
     ca, sa, c3, s3 = cos(alpha), sin(alpha), cos(th3), sin(th3)
     c4, s4, c6, s6 = cos(th4), sin(th4), cos(th6), sin(th6)
     return -s6 * (c4 * sa - ca * c3 * s4) - c6 * ca * s3
 
 
-@equation("(12), (13) n_y", gives="slewing.rotation[2,1]", given=TILT, printed="as printed")
+@equation("(12), (13) n_y", gives="slewing.rotation[2,1]", given=ALPHA, printed="as printed")
 def eq13_ny(p, alpha, th3, th4, th6):
     ca, sa, c3, s3 = cos(alpha), sin(alpha), cos(th3), sin(th3)
     c4, s4, c6, s6 = cos(th4), sin(th4), cos(th6), sin(th6)
@@ -283,7 +289,7 @@ def _(p, th3, th4, th6):
     return -c3 * c6 - s3 * s4 * s6
 
 
-@equation("(12), (13) o_x", gives="slewing.rotation[1,2]", given=TILT,
+@equation("(12), (13) o_x", gives="slewing.rotation[1,2]", given=ALPHA,
           printed="cosα s6s3 − sinα c6c4 − cosα c3c4",
           corrected="s3s6 cosα − c4c6 sinα + c3s4c6 cosα")
 def eq13_ox(p, alpha, th3, th4, th6):
@@ -299,7 +305,7 @@ def _(p, alpha, th3, th4, th6):
     return s3 * s6 * ca - c4 * c6 * sa + c3 * s4 * c6 * ca
 
 
-@equation("(12), (13) o_y", gives="slewing.rotation[2,2]", given=TILT, printed="as printed")
+@equation("(12), (13) o_y", gives="slewing.rotation[2,2]", given=ALPHA, printed="as printed")
 def eq13_oy(p, alpha, th3, th4, th6):
     ca, sa, c3, s3 = cos(alpha), sin(alpha), cos(th3), sin(th3)
     c4, s4, c6, s6 = cos(th4), sin(th4), cos(th6), sin(th6)
@@ -312,13 +318,13 @@ def eq13_oz(p, th3, th4, th6):
     return c3 * s6 - s3 * c6 * s4
 
 
-@equation("(12), (13) a_x", gives="slewing.rotation[1,3]", given=TILT, printed="as printed")
+@equation("(12), (13) a_x", gives="slewing.rotation[1,3]", given=ALPHA, printed="as printed")
 def eq13_ax(p, alpha, th3, th4):
     ca, sa, c3, c4, s4 = cos(alpha), sin(alpha), cos(th3), cos(th4), sin(th4)
     return s4 * sa + ca * c3 * c4
 
 
-@equation("(12), (13) a_y", gives="slewing.rotation[2,3]", given=TILT, printed="as printed")
+@equation("(12), (13) a_y", gives="slewing.rotation[2,3]", given=ALPHA, printed="as printed")
 def eq13_ay(p, alpha, th3, th4):
     ca, sa, c3, c4, s4 = cos(alpha), sin(alpha), cos(th3), cos(th4), sin(th4)
     return c4 * c3 * sa - ca * s4
@@ -330,8 +336,8 @@ def eq13_az(p, th3, th4):
     return -s3 * c4
 
 
-@equation("(12), (13) p_x", gives="slewing.position[1]", given=TILT, unit="m",
-          printed="as printed")
+@equation("(12), (13) p_x", gives="slewing.position[1]", unit="m",
+          given={**ALPHA, "X": "platform.x"}, printed="as printed")
 def eq13_px(p, alpha, X, th3, th4, d5):
     a2, d3, a3, a4, d6 = p.a2, p.d3, p.a3, p.a4, p.d6
     ca, sa, c3, c4, s4 = cos(alpha), sin(alpha), cos(th3), cos(th4), sin(th4)
@@ -339,7 +345,8 @@ def eq13_px(p, alpha, X, th3, th4, d5):
             + d5 * (c4 * sa - ca * c3 * s4) + a3 * ca * c3)
 
 
-@equation("(12), (13) p_y", gives="slewing.position[2]", given=TILT, unit="m",
+@equation("(12), (13) p_y", gives="slewing.position[2]", unit="m",
+          given={**ALPHA, "Y": "platform.y"},
           printed="… − a4[s4cosα − sinα c3s4] − d6[s4cosα + sinα c3c4] …",
           corrected="… − (a4 + d6)[s4cosα − sinα c3c4] …")
 def eq13_py(p, alpha, Y, th3, th4, d5):
@@ -475,7 +482,7 @@ def _(p, V, W, R, r, th4, d5, th6, d1_d, th3_d, th4_d, d5_d, th6_d):
 
 
 @equation("(33), (34) ω", gives="slewing.angular_velocity", unit="rad/s",
-          given={**PLANE, "R": "slewing.rotation"},
+          given={"W": PLANE["W"], "R": "slewing.rotation"},
           printed="J1 and J2 stacked (shapes do not fit; no rail, no rotation)",
           corrected="ω = W_γ e_z + R06 J2ω q̇", note="print read as ω = W_γ e_z + J2ω q̇")
 def eq33_omega(p, W, R, th4, d5, th6, th3_d, th4_d, d5_d, th6_d):
@@ -526,7 +533,7 @@ def _(p, th3, th4, d5, th6, th3_d, th4_d, d5_d, th6_d, th3_dd, th4_dd, d5_dd, th
 # Planar velocities are relative to slider A; the reference's contain V0.
 
 
-@equation("(14)", gives="F", given=ANGLES, unit="rad", printed="ε = asin(L1 sin α/(2 L4))",
+@equation("(14)", gives="F", given=of("A", ANGLES), unit="rad", printed="ε = asin(L1 sin α/(2 L4))",
           note="the joint's angle is π − ε")
 def eq14(p, A):
     alpha = A
@@ -534,7 +541,7 @@ def eq14(p, A):
     return pi - epsilon
 
 
-@equation("(15)", gives="AB.E.velocity in EF[1]", given=ANGLES, unit="m/s",
+@equation("(15)", gives="AB.E.velocity in EF[1]", given=of("F", ANGLES), unit="m/s",
           printed="V_EF = V2 cos ε",
           note="along FE, with slider A; V2 is the speed of F relative to A")
 def eq15(p, F, X1_d, X3_d):
@@ -543,7 +550,7 @@ def eq15(p, F, X1_d, X3_d):
     return -V_EF - V0 * cos(epsilon)
 
 
-@equation("(16)", gives="AB.E.velocity in AB[2]", given=ANGLES, unit="m/s",
+@equation("(16)", gives="AB.E.velocity in AB[2]", given=of("A D F", ANGLES), unit="m/s",
           printed="V_E = V_EF/cos δ, δ = α + β − 90°", corrected="δ = α + ε − 90°",
           note="wrong index; across AB, with slider A")
 def eq16(p, A, D, F, X1_d, X3_d):
@@ -563,7 +570,7 @@ def _(p, A, D, F, X1_d, X3_d):
     return -V_E - V0 * sin(alpha)
 
 
-@equation("(17)", gives="AB.B.velocity in AB[2]", given=ANGLES, unit="m/s",
+@equation("(17)", gives="AB.B.velocity in AB[2]", given=of("A F", ANGLES), unit="m/s",
           printed="V_E = V2 cos ε/sin(α+ε), V_B = 2 V_E", note="across AB, with slider A")
 def eq17(p, A, F, X1_d, X3_d):
     alpha, epsilon, V0, V2 = A, pi - F, X1_d, X3_d - X1_d
@@ -572,7 +579,7 @@ def eq17(p, A, F, X1_d, X3_d):
     return -V_B - V0 * sin(alpha)
 
 
-V_B_GIVEN = {**ANGLES, "v_B": "AB.B.velocity in AB[2]"}
+V_B_GIVEN = {"A": "A", "gamma": "platform.yaw", "v_B": "AB.B.velocity in AB[2]"}
 
 
 def V_B_of(alpha, v_B, V0):
@@ -597,7 +604,7 @@ def eq19(p, A, gamma, v_B, X1_d):
     return -V_BCt - V0 * sin(gamma)
 
 
-@equation("(20) V_CD^n", gives="CD.C.velocity in CD[1]", given=ANGLES, unit="m/s",
+@equation("(20) V_CD^n", gives="CD.C.velocity in CD[1]", given=of("D", ANGLES), unit="m/s",
           printed="V_CD^n = V3 cos β", note="along CD, with slider A")
 def eq20n(p, D, X1_d, X2_d):
     beta, V0, V3 = pi - D, X1_d, X2_d - X1_d
@@ -605,7 +612,7 @@ def eq20n(p, D, X1_d, X2_d):
     return -V_CDn - V0 * cos(beta)
 
 
-@equation("(20) V_CD^t", gives="CD.velocity in CD[2]", given=ANGLES, unit="m/s",
+@equation("(20) V_CD^t", gives="CD.velocity in CD[2]", given=of("D", ANGLES), unit="m/s",
           printed="V_CD^t = V3 sin β", note="of D across CD, with slider A")
 def eq20t(p, D, X1_d, X2_d):
     beta, V0, V3 = pi - D, X1_d, X2_d - X1_d
@@ -615,7 +622,7 @@ def eq20t(p, D, X1_d, X2_d):
 
 # V_BC^n, V_BC^t and m of the reference.
 ALONG_ACROSS = {"v_B": "platform.B.velocity in platform", "v_C": "platform.C.velocity in platform",
-                **ANGLES}
+                "gamma": "platform.yaw"}
 
 
 def V_BC_of(gamma, v_B, V0):
@@ -644,7 +651,8 @@ def _(p, gamma, v_B, v_C, X1_d, d1_d):
     return Vec(V0, 0, d1_d) + V_BCn * Vec(cos(gamma), sin(gamma), 0) + across
 
 
-@equation("(21), (22)", gives="platform.C.velocity in platform[2]", given=V_B_GIVEN, unit="m/s",
+@equation("(21), (22)", gives="platform.C.velocity in platform[2]", given={**V_B_GIVEN, "D": "D"},
+          unit="m/s",
           printed="m = −V_B sin(α−γ) cot(β+γ) + V3 cos β/sin(β+γ)",
           note="across BC, with slider A")
 def eq22(p, A, D, gamma, v_B, X1_d, X2_d):
@@ -733,7 +741,7 @@ def _(p, A, D, F, gamma):
             * (sin(alpha) + sin(alpha - gamma) * sin(beta) / sin(beta + gamma)))
 
 
-@equation("(25) J13", gives="platform.jacobian[4,3]", given=ANGLES,
+@equation("(25) J13", gives="platform.jacobian[4,3]", given=of("D gamma", ANGLES),
           printed="cos β sin γ/sin(γ+β)", corrected="half of it", note="factor 1/2 missing")
 def eq25_13(p, D, gamma):
     beta = pi - D
@@ -796,7 +804,7 @@ def _(p, A, D, F, gamma):
             / (p.L2 * sin(alpha + epsilon)))
 
 
-@equation("(25) J33", gives="platform.jacobian[3,3]", given=ANGLES, unit="1/m",
+@equation("(25) J33", gives="platform.jacobian[3,3]", given=of("D gamma", ANGLES), unit="1/m",
           printed="cos β/(L2 sin(γ+β))", corrected="−cos β/(L2 sin(β+γ))",
           note="sense of rotation opposite to γ")
 def eq25_33(p, D, gamma):
@@ -845,7 +853,7 @@ def eq35_gamma(p, A, D, F, gamma, A_d, D_d, F_d, gamma_d, X1_d, X2_d, X3_d, X1_d
     return plane_acceleration(p, A, D, F, gamma, A_d, D_d, F_d, gamma_d, V, V_d)[2]
 
 
-# Dynamics.
+# Dynamics. e: the drive's row in the coordinates, which are the drives.
 
 PLANAR = ["platform", "sliderA", "AB", "sliderD", "CD", "sliderF", "EF"]
 WRIST_BODIES = ["support", "flip", "table", "slewing"]
@@ -913,85 +921,65 @@ def virtual_work(p, bodies, q, q_d, q_dd):
 
 
 @equation("(47)", gives="{drive}.force", each={"drive": DRIVES}, unit="N, N m",
-          given={"J": "slewing.jacobian"},
+          given={"J": "slewing.jacobian", "e": "{drive}.jacobian"},
           printed="T, U over platform, three drive branches and four wrist bodies",
           corrected="carriage and payload added; branches are slider + link",
           note="the masses are assumptions, and with them how much the print leaves out")
-def eq47(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
+def eq47(p, e, J, d1, X1, X2, X3, th3, th4, d5, th6,
          d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
          d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
-    k = DRIVES.index(drive)
     q = (d1, X1, X2, X3, th3, th4, d5, th6)
     q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, (*PLANAR, *WRIST_BODIES), q, q_d, q_dd)
-    return tau[k] - J.T[k] @ Vec(MOMENT + FORCE)
+    return dot(e, tau) - dot(e, J.T @ Vec(MOMENT + FORCE))
 
 
 @eq47.corrected
-def _(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
+def _(p, e, J, d1, X1, X2, X3, th3, th4, d5, th6,
       d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
       d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
-    k = DRIVES.index(drive)
     q = (d1, X1, X2, X3, th3, th4, d5, th6)
     q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
-    return tau[k] - J.T[k] @ Vec(MOMENT + FORCE)
+    return dot(e, tau) - dot(e, J.T @ Vec(MOMENT + FORCE))
 
 
 @equation("(48), (50)–(52)", gives="{drive}.force", each={"drive": DRIVES}, unit="N, N m",
-          given={"J": "slewing.jacobian"}, printed="Lagrange's equation and virtual work",
+          given={"J": "slewing.jacobian", "e": "{drive}.jacobian"},
+          printed="Lagrange's equation and virtual work",
           note="with a wrench on the end effector")
-def eq48(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
+def eq48(p, e, J, d1, X1, X2, X3, th3, th4, d5, th6,
          d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
          d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
-    k = DRIVES.index(drive)
     q = (d1, X1, X2, X3, th3, th4, d5, th6)
     q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
-    return tau[k] - J.T[k] @ Vec(MOMENT + FORCE)
+    return dot(e, tau) - dot(e, J.T @ Vec(MOMENT + FORCE))
 
 
 @equation("(53)", gives="{drive}.force", each={"drive": DRIVES}, unit="N, N m",
-          given={"J": "slewing.jacobian"}, printed="τ = JᵀQ",
+          given={"J": "slewing.jacobian", "e": "{drive}.jacobian"}, printed="τ = JᵀQ",
           corrected="τ = −JᵀW for a wrench W acting on the end effector",
           note="right for Q exerted by the end effector; added to the forces without the wrench")
-def eq53(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
+def eq53(p, e, J, d1, X1, X2, X3, th3, th4, d5, th6,
          d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
          d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
-    k = DRIVES.index(drive)
     q = (d1, X1, X2, X3, th3, th4, d5, th6)
     q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
-    return tau[k] + (J.T @ Vec(MOMENT + FORCE))[k]
+    return dot(e, tau) + dot(e, J.T @ Vec(MOMENT + FORCE))
 
 
 @eq53.corrected
-def _(p, drive, J, d1, X1, X2, X3, th3, th4, d5, th6,
+def _(p, e, J, d1, X1, X2, X3, th3, th4, d5, th6,
       d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d,
       d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd):
-    k = DRIVES.index(drive)
     q = (d1, X1, X2, X3, th3, th4, d5, th6)
     q_d = (d1_d, X1_d, X2_d, X3_d, th3_d, th4_d, d5_d, th6_d)
     q_dd = (d1_dd, X1_dd, X2_dd, X3_dd, th3_dd, th4_dd, d5_dd, th6_dd)
     tau = virtual_work(p, ("carriage", *PLANAR, *WRIST_BODIES, "payload"), q, q_d, q_dd)
-    return tau[k] - (J.T @ Vec(MOMENT + FORCE))[k]
-
-
-# Of the stiffness: the strut's force under a force and a moment at B.
-
-
-@equation("(55)", gives="0", given=ANGLES, unit="N", each={"case": [1, 2, 3]},
-          printed="N = 2 F_x2/cos θ − 2 M_z/(L1 cos θ)",
-          note="less the equilibrium of AB; x2 square to AB towards the strut, θ = α + ε − 90°, "
-          "compression positive")
-def eq55(p, case, A, F):
-    F_x2, M_z = [(1000.0, 0.0), (0.0, 300.0), (-700.0, 120.0)][case - 1]
-    theta = A + (pi - F) - pi / 2
-    N = 2 * F_x2 / cos(theta) - 2 * M_z / (p.L1 * cos(theta))
-    psi = A + (pi - F)
-    balance = Mat([1.0, 0.0, -cos(psi)], [0.0, 1.0, sin(psi)], [0.0, 0.0, sin(psi) * p.L1 / 2])
-    return N - linear_solve(balance, [0.0, F_x2, F_x2 * p.L1 - M_z])[2]
+    return dot(e, tau) - dot(e, J.T @ Vec(MOMENT + FORCE))

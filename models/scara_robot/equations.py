@@ -28,9 +28,8 @@ states(
 )
 
 LIMBS, FIRST, LAST = {"i": [1, 2, 3, 4]}, {"i": [1, 2]}, {"i": [3, 4]}
-RODS = {"rod": ["limb1.rod_a", "limb1.rod_b", "limb2.rod_a", "limb2.rod_b", "limb3.rod",
-                "limb4.rod"]}
-COMPONENTS = {"c": ["x", "y", "z", "yaw"]}
+RODS = {**FIRST, "rod": ["rod_a", "rod_b"]}  # of limbs 1, 2; limbs 3, 4 have one rod
+XYZ, PHI = {"k": [1, 2, 3]}, {"k": [4]}  # components of X
 THETA = {f"t{i}": f"limb{i}.drive" for i in LIMBS["i"]}
 THETA_D = {f"t{i}_d": f"limb{i}.drive.velocity" for i in LIMBS["i"]}
 THETA_DD = {f"t{i}_dd": f"limb{i}.drive.acceleration" for i in LIMBS["i"]}
@@ -49,10 +48,6 @@ def radial(i):
 def nu(i):
     """Axis of motor i."""
     return Vec(-sin(alpha(i)), cos(alpha(i)), 0.0)
-
-
-def limb_of(rod):
-    return int(rod[4])
 
 
 class Limb:
@@ -344,23 +339,29 @@ def eq28_J(p, i, x, y, z, yaw, theta, x_d, y_d, z_d, yaw_d):
     return J_theta @ Vec(x_d, y_d, z_d, yaw_d) / J_x
 
 
-@equation("(28) Ẋ", gives="platform.{c}.velocity", each=COMPONENTS, given={**THETA, **THETA_D},
+@equation("(28) Ẋ", gives="platform.velocity[{k}]", each=XYZ, given={**THETA, **THETA_D},
           unit="m/s, rad/s", printed="Ẋ = J⁻¹ θ̇ = J⁻¹ J_x⁻¹ J_θ",
           corrected="Ẋ = J⁻¹ θ̇ = J_θ⁻¹ J_x θ̇",
           note="a matrix cannot equal a vector; read as J⁻¹ J_x⁻¹ J_θ θ̇")
-def eq28_X(p, c, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
+def eq28_X(p, k, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
     theta_d = Vec(t1_d, t2_d, t3_d, t4_d)
     X_d = linear_solve(at.J(), linear_solve(at.J_x, at.J_theta @ theta_d))
-    return X_d[COMPONENTS["c"].index(c)]
+    return X_d[k - 1]
 
 
 @eq28_X.corrected
-def _(p, c, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
+def _(p, k, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
     theta_d = Vec(t1_d, t2_d, t3_d, t4_d)
     X_d = linear_solve(at.J_theta, at.J_x @ theta_d)
-    return X_d[COMPONENTS["c"].index(c)]
+    return X_d[k - 1]
+
+
+eq28_phi = equation(
+    "(28) φ̇", gives="platform.yaw.velocity", each=PHI, given={**THETA, **THETA_D}, unit="rad/s",
+    printed="Ẋ = J⁻¹ θ̇ = J⁻¹ J_x⁻¹ J_θ", corrected="Ẋ = J⁻¹ θ̇ = J_θ⁻¹ J_x θ̇", note="as (28) Ẋ",
+)(eq28_X.function).corrected(eq28_X.right)
 
 
 C44 = diag(0, 0, 0, 1)
@@ -394,15 +395,21 @@ def _(p, i, x, y, z, yaw, theta, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd)
     return Vec(*b.eta, dot(b.eta, b.k)) @ X_dd / (p.l1 * b.V) + f_i
 
 
-@equation("(29) Ẍ", gives="platform.{c}.acceleration", each=COMPONENTS,
+@equation("(29) Ẍ", gives="platform.acceleration[{k}]", each=XYZ,
           given={**THETA, **THETA_DD}, unit="m/s², rad/s²", printed="Ẍ = J⁻¹ θ̈ − J⁻¹ f(Ẋ)",
           note="with the corrected f")
-def eq29_X(p, c, x, y, z, yaw, t1, t2, t3, t4, x_d, y_d, z_d, yaw_d, t1_dd, t2_dd, t3_dd, t4_dd):
+def eq29_X(p, k, x, y, z, yaw, t1, t2, t3, t4, x_d, y_d, z_d, yaw_d, t1_dd, t2_dd, t3_dd, t4_dd):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
     X_d, theta_dd = Vec(x_d, y_d, z_d, yaw_d), Vec(t1_dd, t2_dd, t3_dd, t4_dd)
     f = Vec(X_d @ (theta_form(p, b) @ X_d) / p.l1**2 for b in at.limbs)
     X_dd = at.J_inverse @ theta_dd - at.J_inverse @ f
-    return X_dd[COMPONENTS["c"].index(c)]
+    return X_dd[k - 1]
+
+
+eq29_phi = equation(
+    "(29) φ̈", gives="platform.yaw.acceleration", each=PHI, given={**THETA, **THETA_DD},
+    unit="rad/s²", printed="Ẍ = J⁻¹ θ̈ − J⁻¹ f(Ẋ)", note="as (29) Ẍ",
+)(eq29_X.function)
 
 
 def drive_acceleration(p, b, form, X_d, X_dd):
@@ -651,9 +658,9 @@ def _(p, i, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
 ACROSS = {"k": [2, 3]}  # y and z of the rod
 
 
-@equation("(37)", gives="limb{i}.{ab}.angular_velocity in limb{i}.{ab}[{k}]", unit="rad/s",
-          each={**FIRST, "ab": ["rod_a", "rod_b"], **ACROSS},
-          given={**POSE_RATES, "R_rod": "limb{i}.{ab}.rotation"},
+@equation("(37)", gives="limb{i}.{rod}.angular_velocity in limb{i}.{rod}[{k}]", unit="rad/s",
+          each={**RODS, **ACROSS},
+          given={**POSE_RATES, "R_rod": "limb{i}.{rod}.rotation"},
           printed="ε_i = (1/l2) U_i (J_B − 2 J_i1) θ̇, the part across the rod",
           note="with (35) corrected; both rods of a limb turn alike")
 def eq37(p, i, k, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d, R_rod):
@@ -663,12 +670,11 @@ def eq37(p, i, k, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d, R_rod):
     return (R_rod.T @ epsilon)[k - 1]
 
 
-@equation("(37) whole", gives="{rod}.angular_velocity", each=RODS, given=POSE_RATES, unit="rad/s",
-          printed="ε_i without spin",
+@equation("(37) whole", gives="limb{i}.{rod}.angular_velocity", each=RODS, given=POSE_RATES,
+          unit="rad/s", printed="ε_i without spin",
           corrected="ε_i = η × η̇ + b ψ̇ η, b = η·a, ψ̇ = η̇·(a × η)/(1 − b²)",
           note="the rods turn about their own axes too; 1e-5 of the torque, rods thin")
-def eq37_whole(p, rod, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
-    i = limb_of(rod)
+def eq37_whole(p, i, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
     b, theta_d = at.limbs[i - 1], Vec(t1_d, t2_d, t3_d, t4_d)
     eta_d = (at.J_B(i) - 2 * at.J_i1(p, i)) @ theta_d / b.L
@@ -676,14 +682,20 @@ def eq37_whole(p, rod, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
 
 
 @eq37_whole.corrected
-def _(p, rod, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
-    i = limb_of(rod)
+def _(p, i, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
     b, theta_d, a = at.limbs[i - 1], Vec(t1_d, t2_d, t3_d, t4_d), nu(i)
     eta_d = (at.J_B(i) - 2 * at.J_i1(p, i)) @ theta_d / b.L
     slant = dot(b.eta, a)
     psi_d = dot(eta_d, cross(a, b.eta)) / (1 - slant**2)
     return cross(b.eta, eta_d) + slant * psi_d * b.eta
+
+
+eq37_whole_last = equation(
+    "(37) whole, limbs 3, 4", gives="limb{i}.rod.angular_velocity", each=LAST, given=POSE_RATES,
+    unit="rad/s", printed="ε_i without spin",
+    corrected="ε_i = η × η̇ + b ψ̇ η, b = η·a, ψ̇ = η̇·(a × η)/(1 − b²)",
+)(eq37_whole.function).corrected(eq37_whole.right)
 
 
 @equation("(38)", gives="limb{i}.rod.angular_velocity in limb{i}.rod[{k}]", each={**LAST, **ACROSS},
@@ -763,16 +775,21 @@ def _(p, i, k, x, y, z, yaw, x_d, y_d, z_d, yaw_d, t1, t2, t3, t4, t1_d, t2_d, t
     return across_the_rod(omega_d, R_rod, w)[k - 1]
 
 
-@equation("(41)", gives="{rod}.com.acceleration", each=RODS, given=MOTION, unit="m/s²",
+@equation("(41)", gives="limb{i}.{rod}.com.acceleration", each=RODS, given=MOTION, unit="m/s²",
           printed="v̇_i2 = J̇_i2 θ̇ + J_i2 θ̈",
           note="with J_i2 corrected; both rods of a limb move alike")
-def eq41(p, rod, x, y, z, yaw, x_d, y_d, z_d, yaw_d, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d,
+def eq41(p, i, x, y, z, yaw, x_d, y_d, z_d, yaw_d, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d,
          t1_dd, t2_dd, t3_dd, t4_dd):
-    i = limb_of(rod)
     theta, theta_d = [t1, t2, t3, t4], Vec(t1_d, t2_d, t3_d, t4_d)
     J, J_d = with_rate(p, lambda at: at.J_i2(p, i), [x, y, z, yaw], [x_d, y_d, z_d, yaw_d],
                        theta, theta_d)
     return J_d @ theta_d + J @ Vec(t1_dd, t2_dd, t3_dd, t4_dd)
+
+
+eq41_last = equation(
+    "(41) limbs 3, 4", gives="limb{i}.rod.com.acceleration", each=LAST, given=MOTION, unit="m/s²",
+    printed="v̇_i2 = J̇_i2 θ̇ + J_i2 θ̈", note="with J_i2 corrected",
+)(eq41.function)
 
 
 # Forces. Q contains the weight, which the reference's inertia forces do not.
@@ -826,12 +843,11 @@ def eq43_T(p, i, theta, theta_d, theta_dd):
     return -theta_dd * (I @ nu(i)) - theta_d**2 * cross(nu(i), I @ nu(i))
 
 
-@equation("(44), (45) Q_i2", gives="{rod}.inertia_force", each=RODS, unit="N",
-          given={"W": "{rod}.weight", **MOTION}, printed="Q_i2 = m_i2 (g − v̇_i2)",
+@equation("(44), (45) Q_i2", gives="limb{i}.{rod}.inertia_force", each=RODS, unit="N",
+          given={"W": "limb{i}.{rod}.weight", **MOTION}, printed="Q_i2 = m_i2 (g − v̇_i2)",
           note="per rod")
-def eq44_Q(p, rod, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd,
+def eq44_Q(p, i, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd,
            t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d, t1_dd, t2_dd, t3_dd, t4_dd, W):
-    i = limb_of(rod)
     links = Links(p, i, [x, y, z, yaw], [x_d, y_d, z_d, yaw_d], [x_dd, y_dd, z_dd, yaw_dd],
                   [t1, t2, t3, t4], [t1_d, t2_d, t3_d, t4_d], [t1_dd, t2_dd, t3_dd, t4_dd])
     m = p.m_rods / 2 if i <= 2 else p.m_rods
@@ -839,16 +855,28 @@ def eq44_Q(p, rod, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd,
     return Q - W
 
 
-@equation("(44), (45) T_i2", gives="{rod}.inertia_moment", each=RODS, given=MOTION, unit="N m",
-          printed="T_i2 = −I ε̇_i − ε_i (I ε_i)",
+eq45_Q = equation(
+    "(44), (45) Q_i2, limbs 3, 4", gives="limb{i}.rod.inertia_force", each=LAST, unit="N",
+    given={"W": "limb{i}.rod.weight", **MOTION}, printed="Q_i2 = m_i2 (g − v̇_i2)",
+)(eq44_Q.function)
+
+
+@equation("(44), (45) T_i2", gives="limb{i}.{rod}.inertia_moment", each=RODS, given=MOTION,
+          unit="N m", printed="T_i2 = −I ε̇_i − ε_i (I ε_i)",
           note="per rod; read with the lost dot and cross; ε with spin")
-def eq44_T(p, rod, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd,
+def eq44_T(p, i, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd,
            t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d, t1_dd, t2_dd, t3_dd, t4_dd):
-    i = limb_of(rod)
     links = Links(p, i, [x, y, z, yaw], [x_d, y_d, z_d, yaw_d], [x_dd, y_dd, z_dd, yaw_dd],
                   [t1, t2, t3, t4], [t1_d, t2_d, t3_d, t4_d], [t1_dd, t2_dd, t3_dd, t4_dd])
     I = rod_inertia(p, i, links.eta, 0.5 if i <= 2 else 1.0)
     return -(I @ links.omega_d) - cross(links.omega, I @ links.omega)
+
+
+eq45_T = equation(
+    "(44), (45) T_i2, limbs 3, 4", gives="limb{i}.rod.inertia_moment", each=LAST, given=MOTION,
+    unit="N m", printed="T_i2 = −I ε̇_i − ε_i (I ε_i)",
+    note="read with the lost dot and cross; ε with spin",
+)(eq44_T.function)
 
 
 def links_of(p, X, X_d, X_dd, t, t_d, t_dd):
@@ -897,20 +925,26 @@ def _(p, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd, t1, t2, t
             + links)
 
 
-@equation("(47) δX", gives="platform.{c}.velocity", each=COMPONENTS, given=POSE_RATES,
+@equation("(47) δX", gives="platform.velocity[{k}]", each=XYZ, given=POSE_RATES,
           unit="m/s, rad/s", printed="δX = J δθ", corrected="δX = J⁻¹ δθ",
           note="J maps Ẋ to θ̇; with θ̇ as δθ")
-def eq47_X(p, c, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
+def eq47_X(p, k, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
     dX = at.J() @ Vec(t1_d, t2_d, t3_d, t4_d)
-    return dX[COMPONENTS["c"].index(c)]
+    return dX[k - 1]
 
 
 @eq47_X.corrected
-def _(p, c, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
+def _(p, k, x, y, z, yaw, t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d):
     at = Robot(p, x, y, z, yaw, t1, t2, t3, t4)
     dX = linear_solve(at.J(), Vec(t1_d, t2_d, t3_d, t4_d))
-    return dX[COMPONENTS["c"].index(c)]
+    return dX[k - 1]
+
+
+eq47_phi = equation(
+    "(47) δφ", gives="platform.yaw.velocity", each=PHI, given=POSE_RATES, unit="rad/s",
+    printed="δX = J δθ", corrected="δX = J⁻¹ δθ", note="as (47) δX",
+)(eq47_X.function).corrected(eq47_X.right)
 
 
 @equation("(47) δϑ_i1", gives="limb{i}.arm.angular_velocity", each=LIMBS, given=POSE_RATES,

@@ -6,11 +6,12 @@ Chinese Society for Agricultural Machinery 43 (8), 2012, 215–220.
 Names are the paper's: r, v of O_A; R = [u v w] of the platform; a_i from O_A to the hinge A_i, also
 written r_i; b_i from O_B to the ball B_i; c_i the hinge's axis; w_i from B_i to A_i; q_i the leg's
 length; world axes. The states are as on the page of the audit: centres of mass beside the axes,
-inclined gravity, a load on the platform.
+inclined gravity, a load on the platform. The path's law, (21) and (22), and the workspace have no
+states and are audited there.
 """
 
 from mbverify.equations import (
-    Mat, Vec, atan2, cos, cross, dot, hypot, identity, jacobian, linear_solve, motion, norm, pi,
+    Mat, Vec, atan2, cos, cross, dot, hypot, identity, jacobian, linear_solve, norm, pi,
     rot_z, sin, skew, sqrt, states,
 )
 from mbverify.equations import equation
@@ -216,28 +217,28 @@ def _(p, R):
     return zxz(psi, theta, delta)
 
 
-def misfit(p, R, z):
-    """What (2) of the three legs leaves [m] where x0 and y0 fit them best."""
+def best_position(p, R, z):
+    """x0, y0 that meet (2) of the three legs best, by least squares, with z0."""
     hinges = [R @ c(p, i) for i in LEGS["i"]]
-    gap = [dot(c_i, p.b * f(p, i)) - c_i[2] * z for i, c_i in zip(LEGS["i"], hinges)]
-    across = cross([c_i[0] for c_i in hinges], [c_i[1] for c_i in hinges])
-    return dot(across, gap) / norm(across)
+    rows = Mat([c_i[:2] for c_i in hinges])
+    right = [dot(c_i, p.b * f(p, i)) - c_i[2] * z for i, c_i in zip(LEGS["i"], hinges)]
+    return Vec(*linear_solve(rows.T @ rows, rows.T @ Vec(right)), z)
 
 
-@equation("(6) δ in (2)", gives="0", given={"R": "platform.rotation"}, unit="m",
+@equation("(6) δ in (2)", gives="platform.position", given={"R": "platform.rotation"}, unit="m",
           printed="constraints (2) at δ = ψ, x0 and y0 fitted best", corrected="at δ = −ψ",
           note="with the printed torsion no position meets the constraints")
 def eq6constraints(p, R, z):
     psi, theta = psi_of(R), theta_of(R)
     delta = psi
-    return misfit(p, zxz(psi, theta, delta), z)
+    return best_position(p, zxz(psi, theta, delta), z)
 
 
 @eq6constraints.corrected
 def _(p, R, z):
     psi, theta = psi_of(R), theta_of(R)
     delta = -psi
-    return misfit(p, zxz(psi, theta, delta), z)
+    return best_position(p, zxz(psi, theta, delta), z)
 
 
 @equation("(7) q1", gives="leg1", given={"R": "platform.rotation"}, unit="m",
@@ -471,25 +472,25 @@ def eq16(p, k, v, omega, a, w, q, R_i):
     return (R_i.T @ omega_xy)[k - 1]
 
 
-@equation("(17)", gives="0", each=LEGS, unit="m/s",
+@equation("(17)", gives="0", each={**LEGS, "k": [1, 2, 3]}, unit="m/s",
           given={**twist, "a": a_w["a"], "R": "platform.rotation", "v_A": "leg{i}.rod.velocity",
                  "omega_i": "leg{i}.rod.angular_velocity"},
           printed="v_Ci = v + ω × (r_i + c_i)", note="less the point C_i of the reference's rods")
-def eq17(p, i, v, omega, a, R, v_A, omega_i):
+def eq17(p, i, k, v, omega, a, R, v_A, omega_i):
     c_i = R @ c(p, i)
     v_C = v + cross(omega, a + c_i)
-    return v_C - (v_A + cross(omega_i, c_i))
+    return (v_C - (v_A + cross(omega_i, c_i)))[k - 1]
 
 
-@equation("(18) second form", gives="0", each=LEGS, unit="m/s",
+@equation("(18) second form", gives="0", each={**LEGS, "k": [1, 2, 3]}, unit="m/s",
           given={**twist, "a": a_w["a"], "R": "platform.rotation",
                  "omega_i": "leg{i}.rod.angular_velocity"},
           printed="v_Ci = v + ω × r_i + ω_i × c_i",
           note="less the point C_i of the reference's platform")
-def eq18(p, i, v, omega, a, R, omega_i):
+def eq18(p, i, k, v, omega, a, R, omega_i):
     c_i = R @ c(p, i)
     v_C = v + cross(omega, a) + cross(omega_i, c_i)
-    return v_C - (v + cross(omega, a + c_i))
+    return (v_C - (v + cross(omega, a + c_i)))[k - 1]
 
 
 @equation("(19)", gives="leg{i}.rod.angular_velocity in leg{i}.rod[3]", each=LEGS, unit="rad/s",
@@ -517,45 +518,6 @@ def _(p, r, R, a, w, v, q):
     E, J_c = identity(), Pose(p, r, R).J_c()
     J_d = (skew(w) + (dot(w, a) * E - outer(a, w) + q * outer(w, w)) @ J_c) / q
     return J_d @ v
-
-
-# The path's law; of no state.
-
-A_MAX, T = 10.0, 0.3  # m/s², s
-
-
-def law(t):
-    rho = t / T
-    return A_MAX * T**2 / 5.7735 * (10 * rho**3 - 15 * rho**4 + 6 * rho**5)
-
-
-@equation("(21)", gives="0", unit="m/s²", approximation=A_MAX * 5e-5 / 5.7735,
-          printed="S = a_max T²/5.7735 (10ρ³ − 15ρ⁴ + 6ρ⁵)", corrected="10/√3 for 5.7735",
-          note="peak acceleration, at ρ = (3 − √3)/6, less a_max; 5.7735 is rounded")
-def eq21(p):
-    def S(t):
-        rho = t / T
-        return A_MAX * T**2 / 5.7735 * (10 * rho**3 - 15 * rho**4 + 6 * rho**5)
-
-    return motion(S, [T * (3 - sqrt(3)) / 6], [1], [0])[2] - A_MAX
-
-
-@eq21.corrected
-def _(p):
-    def S(t):
-        rho = t / T
-        return A_MAX * T**2 / (10 / sqrt(3)) * (10 * rho**3 - 15 * rho**4 + 6 * rho**5)
-
-    return motion(S, [T * (3 - sqrt(3)) / 6], [1], [0])[2] - A_MAX
-
-
-@equation("(22)", gives="0", each={"tenths": [2, 5, 8]}, unit="m/s",
-          printed="v_max = a_max T/5.7735 (30ρ² − 60ρ³ + 30ρ⁴), ρ = 1/2",
-          note="less the rate of (21)")
-def eq22(p, tenths):
-    rho = tenths / 10
-    v = A_MAX * T / 5.7735 * (30 * rho**2 - 60 * rho**3 + 30 * rho**4)
-    return v - motion(law, [rho * T], [1], [0])[1]
 
 
 # Accelerations and forces; not in the paper.

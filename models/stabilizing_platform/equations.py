@@ -40,6 +40,12 @@ SHIP_DD = {"al_dd": "roll.acceleration", "be_dd": "pitch.acceleration",
 YAW = {"ga": "platform.yaw"}
 YAW_D, YAW_DD = {"ga_d": "platform.yaw.velocity"}, {"ga_dd": "platform.yaw.acceleration"}
 
+
+def of(names, quantities):
+    """Those of the quantities that are named."""
+    return {name: quantities[name] for name in names.split()}
+
+
 # What the paper defines.
 
 
@@ -78,15 +84,16 @@ def Ad(R, r, V):
 JOINTS = {"u": "limb{i}.U1{side}.1", "r": "limb{i}.R12{side}"}
 
 
-def q1_q2(u, r, side):
-    """q1 and q2 from the angle of link 1 over Y and that between the links."""
-    return (pi - u, pi - u - r) if side else (u, u + r)
+def q1_q2(u, r):
+    """q1 and q2 of either side, from the angle of link 1 over Y (blunt on the primed side) and the
+    angle between the links."""
+    return (u, u + r) if u < pi / 2 else (pi - u, pi - u - r)
 
 
 # Screws of a limb, closure conditions.
 
 TIP = {"tip": "limb{i}.link2.limb{i}.tip.position", "A": "lower_platform.limb{i}.A.position"}
-TIP_IN_BASE = "limb{i}.link2.limb{i}.tip.position from lower_platform in lower_platform"
+TIP_IN_BASE = "limb{i}.link2.limb{i}.tip.position in lower_platform from lower_platform"
 CHAIN = {
     "R_A": "lower_platform.limb{i}.A.rotation", "A": "lower_platform.limb{i}.A.position",
     "E": "limb{i}.link2.position", "lam": "limb{i}.U1.0", "lam_d": "limb{i}.U1.0.velocity",
@@ -146,7 +153,7 @@ def eq2(p, i, R_o, o, v_o, w_o, B, v_B):
 
 
 @equation("(3)", gives="platform.position", each=LIMBS, unit="m",
-          given={**SHIP, "R_ep": "platform.rotation", "r_oB": TIP_IN_BASE},
+          given=of("al be h R_ep r_oB", {**SHIP, "R_ep": "platform.rotation", "r_oB": TIP_IN_BASE}),
           printed="r_ep = r_es + R_es r_so + R_eo r_oB − R_ep r_pB",
           note="with the tips B_i of links 2")
 def eq3(p, i, al, be, h, R_ep, r_oB):
@@ -156,7 +163,7 @@ def eq3(p, i, al, be, h, R_ep, r_oB):
 
 
 @equation("(4)", gives="0", unit="m",
-          given={"B": "limb3.link2.limb3.tip.position from lower_platform in lower_platform"},
+          given={"B": "limb3.link2.limb3.tip.position in lower_platform from lower_platform"},
           printed="y_B/x_B = 0, tan θ1, tan θ2 with θ1 = θ2 = 120°", corrected="θ2 = 240°",
           note="distance of B_3 from the plane of limb 3")
 def eq4(p, B):
@@ -180,7 +187,7 @@ def u_of(t1, t2):
     return u1, u2, u3
 
 
-@equation("section 4 data, in (5)", gives="platform.yaw", given=SHIP, unit="rad",
+@equation("section 4 data, in (5)", gives="platform.yaw", given=of("al be", SHIP), unit="rad",
           printed="θ1 = θ2 = 120°: u1 = u2 = u3 = 0, γ = atan(0/0)", corrected="θ2 = 240°")
 def data_in_5(p, al, be):
     u1, u2, u3 = u_of(p.theta_1, p.theta_1)
@@ -195,7 +202,7 @@ def _(p, al, be):
                 / (u3 * cos(al) + u2 * cos(be) - u1 * sin(al) * sin(be)))
 
 
-@equation("(5) γ", gives="platform.yaw", given=SHIP, unit="rad", printed="γ = atan[…]")
+@equation("(5) γ", gives="platform.yaw", given=of("al be", SHIP), unit="rad", printed="γ = atan[…]")
 def eq5_gamma(p, al, be):
     t1, t2 = p.theta_1, p.theta_2
     u1 = sin(t1) * tan(t2) - sin(t2) * tan(t1)
@@ -205,7 +212,7 @@ def eq5_gamma(p, al, be):
                 / (u3 * cos(al) + u2 * cos(be) - u1 * sin(al) * sin(be)))
 
 
-@equation("(5) y", gives="platform.y", given={**SHIP, **YAW}, unit="m",
+@equation("(5) y", gives="platform.y", given=of("al h z0 ga", {**SHIP, **YAW}), unit="m",
           printed="y = −tα (z0 − h) − r_b sγ")
 def eq5_y(p, al, h, z0, ga):
     return -tan(al) * (z0 - h) - p.r_b * sin(ga)
@@ -220,8 +227,8 @@ def eq5_x(p, al, be, h, z0, ga):
             / (cos(be) * tan(t2)))
 
 
-@equation("(6) γ'", gives="platform.yaw.velocity", given={**SHIP, **SHIP_D}, unit="rad/s",
-          printed="w4 in U is not defined", corrected="w4 = u1² + u3²")
+@equation("(6) γ'", gives="platform.yaw.velocity", given=of("al be al_d be_d", {**SHIP, **SHIP_D}),
+          unit="rad/s", printed="w4 in U is not defined", corrected="w4 = u1² + u3²")
 def eq6_gamma(p, al, be, al_d, be_d):
     unreachable("w4 is not defined")
 
@@ -238,7 +245,7 @@ def _(p, al, be, al_d, be_d):
 
 
 @equation("(6) y'", gives="platform.y.velocity", unit="m/s",
-          given={**SHIP, **SHIP_D, **YAW, **YAW_D},
+          given=of("al h z0 al_d h_d ga ga_d", {**SHIP, **SHIP_D, **YAW, **YAW_D}),
           printed="y' = −(1 + tα²)(z0 − h) α' + tα h' − r_b cγ γ'")
 def eq6_y(p, al, h, z0, al_d, h_d, ga, ga_d):
     return -(1 + tan(al)**2) * (z0 - h) * al_d + tan(al) * h_d - p.r_b * cos(ga) * ga_d
@@ -295,7 +302,8 @@ def _(p, al, be, h, z0, al_d, be_d, h_d, ga, ga_d):
     return L * al_d + M * be_d + N * ga_d - tan(be) * h_d / cos(al)
 
 
-@equation("(7) γ''", gives="platform.yaw.acceleration", given={**SHIP, **SHIP_D, **SHIP_DD},
+@equation("(7) γ''", gives="platform.yaw.acceleration", 
+          given=of("al be al_d be_d al_dd be_dd", {**SHIP, **SHIP_D, **SHIP_DD}),
           unit="rad/s²", printed="γ'' = […]/U² (with w4 as corrected)")
 def eq7_gamma(p, al, be, al_d, be_d, al_dd, be_dd):
     u1, u2, u3 = u_of(p.theta_1, p.theta_2)
@@ -315,7 +323,8 @@ def eq7_gamma(p, al, be, al_d, be_d, al_dd, be_dd):
 
 
 @equation("(7) y''", gives="platform.y.acceleration", unit="m/s²",
-          given={**SHIP, **SHIP_D, **SHIP_DD, **YAW, **YAW_D, **YAW_DD},
+          given={**of("al h z0 al_d h_d al_dd h_dd", {**SHIP, **SHIP_D, **SHIP_DD}), **YAW, **YAW_D,
+                 **YAW_DD},
           printed="y'' = −(1+tα²)(z0−h) α'' + tα h'' − r_b cγ γ'' − 2tα(1+tα²)(z0−h) α'² "
           "+ r_b sγ γ'² + 2(1+tα²) h' α'")
 def eq7_y(p, al, h, z0, al_d, h_d, al_dd, h_dd, ga, ga_d, ga_dd):
@@ -380,15 +389,16 @@ def eq9(p, v_p, r_ep, B, ga_d, ga_dd, a_p, v_B):
     return a + cross(epsilon, B) + cross(omega, v_B)
 
 
-@equation("(10) ω", gives="lower_platform.angular_velocity", given={**SHIP, **SHIP_D},
-          unit="rad/s", printed="ω_eo = α' e_x + β' e_y'")
+@equation("(10) ω", gives="lower_platform.angular_velocity", 
+          given=of("al al_d be_d", {**SHIP, **SHIP_D}), unit="rad/s",
+          printed="ω_eo = α' e_x + β' e_y'")
 def eq10_omega(p, al, al_d, be_d):
     e_x, e_y = Vec(1, 0, 0), Vec(0, cos(al), sin(al))
     return al_d * e_x + be_d * e_y
 
 
 @equation("(10) v", gives="lower_platform.limb{i}.A.velocity", each=LIMBS, unit="m/s",
-          given={**SHIP, **SHIP_D, "A": "lower_platform.limb{i}.A.position"},
+          given={**of("al be h", SHIP), **SHIP_D, "A": "lower_platform.limb{i}.A.position"},
           printed="V_eo = [ω; v_o − ω × r_eo]")
 def eq10_v(p, al, be, h, al_d, be_d, h_d, A):
     omega = al_d * Vec(1, 0, 0) + be_d * Vec(0, cos(al), sin(al))
@@ -399,7 +409,7 @@ def eq10_v(p, al, be, h, al_d, be_d, h_d, A):
 
 
 @equation("(11) ε", gives="lower_platform.angular_acceleration", unit="rad/s²",
-          given={**SHIP, **SHIP_D, **SHIP_DD},
+          given=of("al al_d be_d al_dd be_dd", {**SHIP, **SHIP_D, **SHIP_DD}),
           printed="ε_eo = α'' e_x + β'' e_y' + α'β' e_x × e_y'",
           note="e_y once without its prime, read as e_y'")
 def eq11_epsilon(p, al, al_d, be_d, al_dd, be_dd):
@@ -408,7 +418,8 @@ def eq11_epsilon(p, al, al_d, be_d, al_dd, be_dd):
 
 
 @equation("(11) a", gives="lower_platform.limb{i}.A.acceleration", each=LIMBS, unit="m/s²",
-          given={**SHIP, **SHIP_D, **SHIP_DD, "A": "lower_platform.limb{i}.A.position",
+          given={**of("al be h", SHIP), **SHIP_D, **SHIP_DD,
+                 "A": "lower_platform.limb{i}.A.position",
                  "v_A": "lower_platform.limb{i}.A.velocity"},
           printed="A_eo = [ε; a_o − ε × r_eo − ω × v_o]")
 def eq11_a(p, al, be, h, al_d, be_d, h_d, al_dd, be_dd, h_dd, A, v_A):
@@ -425,11 +436,11 @@ def eq11_a(p, al, be, h, al_d, be_d, h_d, al_dd, be_dd, h_dd, A, v_A):
 
 # The upper platform against the lower one: pose in {o} and its rates.
 POSES = ["x", "y", "z", "roll", "pitch", "yaw"]
-RELATIVE = {
+RELATIVE_D = {
     **{f"o_{c}": f"platform_in_base.{c}" for c in POSES},
     **{f"o_{c}_d": f"platform_in_base.{c}.velocity" for c in POSES},
-    **{f"o_{c}_dd": f"platform_in_base.{c}.acceleration" for c in POSES},
 }
+RELATIVE = {**RELATIVE_D, **{f"o_{c}_dd": f"platform_in_base.{c}.acceleration" for c in POSES}}
 LOWER = {"w_o": "lower_platform.angular_velocity", "v_o": "lower_platform.velocity",
          "r_eo": "lower_platform.position", "R_eo": "lower_platform.rotation"}
 LOWER_DD = {"e_o": "lower_platform.angular_acceleration", "a_o": "lower_platform.acceleration"}
@@ -448,8 +459,8 @@ def relative_twist(q, q_d, q_dd):
             Vec(*epsilon, *(r_dd - cross(epsilon, r) - cross(omega, r_d))))
 
 
-@equation("(12) ω", gives="platform.angular_velocity", given={**RELATIVE, **LOWER}, unit="rad/s",
-          printed="V_ep = V_eo + Ad(g_eo) °V_op")
+@equation("(12) ω", gives="platform.angular_velocity", given={**RELATIVE_D, **LOWER},
+          unit="rad/s", printed="V_ep = V_eo + Ad(g_eo) °V_op")
 def eq12_omega(p, o_x, o_y, o_z, o_roll, o_pitch, o_yaw, o_x_d, o_y_d, o_z_d, o_roll_d, o_pitch_d,
                o_yaw_d, w_o, v_o, r_eo, R_eo):
     q = [o_x, o_y, o_z, o_roll, o_pitch, o_yaw]
@@ -460,7 +471,7 @@ def eq12_omega(p, o_x, o_y, o_z, o_roll, o_pitch, o_yaw, o_x_d, o_y_d, o_z_d, o_
 
 
 @equation("(12) v", gives="platform.velocity", unit="m/s",
-          given={**RELATIVE, **LOWER, "r_ep": "platform.position"},
+          given={**RELATIVE_D, **LOWER, "r_ep": "platform.position"},
           printed="V_ep = V_eo + Ad(g_eo) °V_op")
 def eq12_v(p, o_x, o_y, o_z, o_roll, o_pitch, o_yaw, o_x_d, o_y_d, o_z_d, o_roll_d, o_pitch_d,
            o_yaw_d, w_o, v_o, r_eo, R_eo, r_ep):
@@ -505,7 +516,7 @@ def eq13_a(p, o_x, o_y, o_z, o_roll, o_pitch, o_yaw, o_x_d, o_y_d, o_z_d, o_roll
 
 # Limb lengths.
 
-IN_BASE = {"r_op": "platform.position from lower_platform in lower_platform",
+IN_BASE = {"r_op": "platform.position in lower_platform from lower_platform",
            "R_op": "platform.rotation in lower_platform"}
 
 
@@ -526,8 +537,6 @@ def virtual_limb(p, i, r_op, R_op):
         rotation_screw([1, 0, 0], B), rotation_screw([0, 1, 0], B), rotation_screw([0, 0, 1], B),
     ).T
 
-
-RELATIVE_D = {k: v for k, v in RELATIVE.items() if not k.endswith("_dd")}
 
 
 @equation("(15) virtual joint", gives="0", each=LIMBS, given={**IN_BASE, **RELATIVE_D},
@@ -640,17 +649,18 @@ def _(p, i, B):
     return atan(dot(e_r(p, i), B - A) / (B[2] - A[2]))
 
 
-@equation("(18)", gives="0", each={**LIMBS, **SIDES}, given={**JOINTS, **TIP}, unit="m",
-          printed="foot – A – tip = foot – elbow – tip")
-def eq18(p, side, u, r, tip, A):
-    (q1, q2), l = q1_q2(u, r, side), norm(tip - A)
-    return [p.L1 * cos(q1) + p.L3 * cos(q2) - p.L5, p.L1 * sin(q1) + p.L3 * sin(q2) - l]
+@equation("(18)", gives="0", each={**LIMBS, **SIDES, "row": [1, 2]}, given={**JOINTS, **TIP},
+          unit="m", printed="foot – A – tip = foot – elbow – tip")
+def eq18(p, row, u, r, tip, A):
+    (q1, q2), l = q1_q2(u, r), norm(tip - A)
+    return [p.L1 * cos(q1) + p.L3 * cos(q2) - p.L5,
+            p.L1 * sin(q1) + p.L3 * sin(q2) - l][row - 1]
 
 
 @equation("(19)", gives="limb{i}.drive{side}", each={**LIMBS, **SIDES}, given=JOINTS, unit="m",
           printed="foot – base ball – rod ball = foot – rod ball")
-def eq19(p, side, u, r):
-    q1, q2 = q1_q2(u, r, side)
+def eq19(p, u, r):
+    q1, q2 = q1_q2(u, r)
     q12 = q1 + p.theta_3
     return hypot(p.L2 * cos(q12) - p.L5 - p.L4, p.L2 * sin(q12))
 
@@ -676,15 +686,15 @@ def _(p, tip, A):
           printed="R = √[(L1 C1 − L2 − L2)² + (L2 S2)²]",
           corrected="R = √[(L2 C2 − L5 − L4)² + (L2 S2)²]",
           note="subscripts damaged in the print; C2, S2 of q1 + θ3")
-def eq20_R(p, side, u, r):
-    q1, q2 = q1_q2(u, r, side)
+def eq20_R(p, u, r):
+    q1, q2 = q1_q2(u, r)
     C1, S2 = cos(q1), sin(q1 + p.theta_3)
     return sqrt((p.L1 * C1 - p.L2 - p.L2)**2 + (p.L2 * S2)**2)
 
 
 @eq20_R.corrected
-def _(p, side, u, r):
-    q1, q2 = q1_q2(u, r, side)
+def _(p, u, r):
+    q1, q2 = q1_q2(u, r)
     C2, S2 = cos(q1 + p.theta_3), sin(q1 + p.theta_3)
     return sqrt((p.L2 * C2 - p.L5 - p.L4)**2 + (p.L2 * S2)**2)
 
@@ -692,8 +702,8 @@ def _(p, side, u, r):
 @equation("derivatives of (18), (19): R'", gives="limb{i}.drive{side}.velocity", unit="m/s",
           each={**LIMBS, **SIDES}, given={**JOINTS, **SPAN, "R": "limb{i}.drive{side}"},
           printed="four linear systems, not written out", note="solved in closed form")
-def R_rate(p, side, u, r, tip, A, v_t, v_A, R):
-    (q1, q2), l_d = q1_q2(u, r, side), length_rates(tip - A, v_t - v_A, Vec(0, 0, 0))[1]
+def R_rate(p, u, r, tip, A, v_t, v_A, R):
+    (q1, q2), l_d = q1_q2(u, r), length_rates(tip - A, v_t - v_A, Vec(0, 0, 0))[1]
     q1_d = sin(q2) * l_d / (p.L1 * sin(q2 - q1))
     return p.L2 * (p.L4 + p.L5) * sin(q1 + p.theta_3) * q1_d / R
 
@@ -702,8 +712,8 @@ def R_rate(p, side, u, r, tip, A, v_t, v_A, R):
           each={**LIMBS, **SIDES}, unit="m/s²",
           given={**JOINTS, **SPAN, **SPAN_DD, "R": "limb{i}.drive{side}"},
           printed="four linear systems, not written out", note="solved in closed form")
-def R_acceleration(p, side, u, r, tip, A, v_t, v_A, a_t, a_A, R):
-    q1, q2 = q1_q2(u, r, side)
+def R_acceleration(p, u, r, tip, A, v_t, v_A, a_t, a_A, R):
+    q1, q2 = q1_q2(u, r)
     l, l_d, l_dd = length_rates(tip - A, v_t - v_A, a_t - a_A)
     q1_d = sin(q2) * l_d / (p.L1 * sin(q2 - q1))
     q2_d = -sin(q1) * l_d / (p.L3 * sin(q2 - q1))
@@ -890,14 +900,14 @@ LIMB = {**TIP, "u": "limb{i}.U1.1", "r": "limb{i}.R12", "u_p": "limb{i}.U1_p.1",
 
 
 def plane_of(p, tip, A, u, r, u_p, r_p, R, R_p):
-    (q1, q2), (q1_p, q2_p) = q1_q2(u, r, ""), q1_q2(u_p, r_p, "_p")
+    (q1, q2), (q1_p, q2_p) = q1_q2(u, r), q1_q2(u_p, r_p)
     return LimbPlane(p, [q1, q1_p], [q2, q2_p], norm(tip - A), [R, R_p])
 
 
-def limb_matrix(plane, corrected):
+def limb_matrix(plane):
     """30 × 30: rows cross, 2, 2', 1, 1' with [m; f] each; columns cross–2, cross–2', 2–1, 2'–1'
-    (F, M_Y, M_Z), 1–base, 1'–base (F, M_Z), drives. Corrected: R22' as a ball, and the platform
-    acts on the cross along and about X."""
+    (F, M_Y, M_Z), 1–base, 1'–base (F, M_Z), drives. As corrected, R22' is a ball, and the platform
+    acts on the cross along and about X: in place of M_Y, M_Z of cross–2'."""
     rows = [[0.0] * 30 for _ in range(30)]
     X, Y, Z = identity()
 
@@ -916,12 +926,9 @@ def limb_matrix(plane, corrected):
                 add(body, column + 3 + k, sign, axis, Vec(0, 0, 0))
 
     joint(0, plane.B, 1, 0, (Y, Z))
-    if corrected:
-        joint(5, plane.B, 2, 0, ())
-        add(0, 8, -1.0, cross(plane.B, X), X)
-        add(0, 9, 1.0, X, Vec(0, 0, 0))
-    else:
-        joint(5, plane.B, 2, 0, (Y, Z))
+    joint(5, plane.B, 2, 0, ())
+    add(0, 8, -1.0, cross(plane.B, X), X)
+    add(0, 9, 1.0, X, Vec(0, 0, 0))
     for k in range(2):
         joint(10 + 5 * k, plane.E[k], 1 + k, 3 + k, (Y, Z))
         joint(20 + 4 * k, plane.U[k], 3 + k, None, (Z,))
@@ -929,77 +936,39 @@ def limb_matrix(plane, corrected):
     return rows
 
 
-def eliminate(rows, right):
-    """Rank, and the largest right side of the rows without any unknown left, by full pivots."""
-    n = len(rows)
-    rows = [list(row) + [b] for row, b in zip(rows, right)]
-    rank = 0
-    while rank < n:
-        size, i, j = max((abs(rows[i][j]), i, j) for i in range(rank, n) for j in range(rank, n))
-        if size < 1e-9:
-            break
-        rows[rank], rows[i] = rows[i], rows[rank]
-        for row in rows:
-            row[rank], row[j] = row[j], row[rank]
-        for row in rows[rank + 1:]:
-            factor = row[rank] / rows[rank][rank]
-            for k in range(rank, n + 1):
-                row[k] -= factor * rows[rank][k]
-        rank += 1
-    return rank, max((abs(row[n]) for row in rows[rank:]), default=0.0)
-
-
-@equation("30 equations, rank", gives="0", each=LIMBS, given=LIMB,
+@equation("30 equations, solvable", gives="0", each=LIMBS, unit="N m",
+          given={**TIP, **LIMB_LINKS, "R_eo": "lower_platform.rotation",
+                 "f_X": "limb{i}.S.reaction.force[1]"},
           printed="30 unknowns, 30 equations",
           corrected="R22' as a ball; platform acts on the cross along and about X",
-          note="30 − rank; the printed loop can carry M_Z and an X force unnoticed")
-def rank30(p, tip, A, u, r, u_p, r_p, R, R_p):
-    rows = limb_matrix(plane_of(p, tip, A, u, r, u_p, r_p, R, R_p), False)
-    return 30 - eliminate(rows, [0.0] * 30)[0]
-
-
-@rank30.corrected
-def _(p, tip, A, u, r, u_p, r_p, R, R_p):
-    rows = limb_matrix(plane_of(p, tip, A, u, r, u_p, r_p, R, R_p), True)
-    return 30 - eliminate(rows, [0.0] * 30)[0]
-
-
-SOLVABLE = {**LIMB, **LIMB_LINKS, "R_eo": "lower_platform.rotation", "lam": "limb{i}.U1.0",
-            "S": "limb{i}.S.reaction.force", "R_2": "limb{i}.link2.rotation"}
-
-
-def right_side(p, i, plane, A, R_eo, lam, S, R_2, links):
-    """Of the 30 equations; the platform's forces along Y and Z are the reference's."""
-    axes = Mat(limb_axes(p, i, R_eo, lam))
-    f = axes @ (R_2 @ S)
-    on_cross = Vec(0.0, f[1], f[2])
-    first, first_p, second, second_p = (required_wrench(axes, A, *link) for link in links)
-    return [*cross(plane.B, on_cross), *on_cross, *second, *second_p, *first, *first_p]
-
-
-@equation("30 equations, solvable", gives="0", each=LIMBS, given=SOLVABLE, unit="N, N m",
-          printed="30 unknowns, 30 equations", corrected="as above",
-          note="what the best elimination leaves over: nothing holds the limb's tilt")
-def solvable30(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam, S, R_2,
-               G_link1, F_link1, N_link1, W_link1, G_link1_p, F_link1_p, N_link1_p, W_link1_p,
-               G_link2, F_link2, N_link2, W_link2, G_link2_p, F_link2_p, N_link2_p, W_link2_p):
-    plane = plane_of(p, tip, A, u, r, u_p, r_p, R, R_p)
-    links = [(G_link1, F_link1, N_link1, W_link1), (G_link1_p, F_link1_p, N_link1_p, W_link1_p),
-             (G_link2, F_link2, N_link2, W_link2), (G_link2_p, F_link2_p, N_link2_p, W_link2_p)]
-    right = right_side(p, i, plane, A, R_eo, lam, S, R_2, links)
-    return eliminate(limb_matrix(plane, False), right)[1]
+          note="sum of all moments about Y of the base: nothing else holds the limb's tilt")
+def solvable30(p, i, tip, A, R_eo, f_X, G_link1, F_link1, N_link1, W_link1,
+               G_link1_p, F_link1_p, N_link1_p, W_link1_p, G_link2, F_link2, N_link2, W_link2,
+               G_link2_p, F_link2_p, N_link2_p, W_link2_p):
+    l, Y = norm(tip - A), R_eo @ e_t(p, i)
+    required = (
+        -N_link1 - cross(G_link1 - A, F_link1 + W_link1)
+        - N_link1_p - cross(G_link1_p - A, F_link1_p + W_link1_p)
+        - N_link2 - cross(G_link2 - A, F_link2 + W_link2)
+        - N_link2_p - cross(G_link2_p - A, F_link2_p + W_link2_p)
+    )
+    M_Y = dot(Y, required)
+    return M_Y
 
 
 @solvable30.corrected
-def _(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam, S, R_2,
-      G_link1, F_link1, N_link1, W_link1, G_link1_p, F_link1_p, N_link1_p, W_link1_p,
-      G_link2, F_link2, N_link2, W_link2, G_link2_p, F_link2_p, N_link2_p, W_link2_p):
-    plane = plane_of(p, tip, A, u, r, u_p, r_p, R, R_p)
-    links = [(G_link1, F_link1, N_link1, W_link1), (G_link1_p, F_link1_p, N_link1_p, W_link1_p),
-             (G_link2, F_link2, N_link2, W_link2), (G_link2_p, F_link2_p, N_link2_p, W_link2_p)]
-    right = right_side(p, i, plane, A, R_eo, lam, S, R_2, links)
-    matrix = Mat(limb_matrix(plane, True))
-    return max(abs(e) for e in matrix @ linear_solve(matrix, right) - Vec(right))
+def _(p, i, tip, A, R_eo, f_X, G_link1, F_link1, N_link1, W_link1,
+      G_link1_p, F_link1_p, N_link1_p, W_link1_p, G_link2, F_link2, N_link2, W_link2,
+      G_link2_p, F_link2_p, N_link2_p, W_link2_p):
+    l, Y = norm(tip - A), R_eo @ e_t(p, i)
+    required = (
+        -N_link1 - cross(G_link1 - A, F_link1 + W_link1)
+        - N_link1_p - cross(G_link1_p - A, F_link1_p + W_link1_p)
+        - N_link2 - cross(G_link2 - A, F_link2 + W_link2)
+        - N_link2_p - cross(G_link2_p - A, F_link2_p + W_link2_p)
+    )
+    M_Y = dot(Y, required)
+    return M_Y + l * f_X
 
 
 def drive_forces(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam, f_Y, f_Z, links):
@@ -1015,17 +984,23 @@ def drives_by_30(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam, f_Y, f_Z, link
     first, first_p, second, second_p = (required_wrench(axes, A, *link) for link in links)
     on_cross = Vec(0.0, f_Y, f_Z)
     right = [*cross(plane.B, on_cross), *on_cross, *second, *second_p, *first, *first_p]
-    return linear_solve(Mat(limb_matrix(plane, True)), right)[28:]
+    return linear_solve(Mat(limb_matrix(plane)), right)[28:]
 
 
-DRIVES = {**BALANCE, **LIMB, **LIMB_LINKS}
+FOOT = "lower_platform.limb{i}.U1{side}.position in lower_platform from lower_platform"
+DRIVES = {**BALANCE, **LIMB, **LIMB_LINKS, "foot": FOOT}
+
+
+def side_of(p, i, foot):
+    """0: unprimed, with the foot at −L5 along Y; 1: primed."""
+    return 0 if dot(e_t(p, i), foot) < 0 else 1
 
 
 @equation("30 equations, drives", gives="limb{i}.drive{side}.force", each={**LIMBS, **SIDES},
           given=DRIVES, unit="N",
           printed="(21) without f_X, then the links in the limb plane only",
           corrected="corrected (21) and 30 equations")
-def drives30(p, i, side, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, F, N, G,
+def drives30(p, i, foot, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, F, N, G,
              tip, A, u, r, u_p, r_p, R, R_p,
              G_link1, F_link1, N_link1, W_link1, G_link1_p, F_link1_p, N_link1_p, W_link1_p,
              G_link2, F_link2, N_link2, W_link2, G_link2_p, F_link2_p, N_link2_p, W_link2_p):
@@ -1035,11 +1010,11 @@ def drives30(p, i, side, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3
              (G_link2, F_link2, N_link2, W_link2), (G_link2_p, F_link2_p, N_link2_p, W_link2_p)]
     drives = drive_forces(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam[i - 1], f[2 + i],
                           f[i - 1], links)
-    return drives[1 if side else 0]
+    return drives[side_of(p, i, foot)]
 
 
 @drives30.corrected
-def _(p, i, side, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, F, N, G,
+def _(p, i, foot, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, F, N, G,
       tip, A, u, r, u_p, r_p, R, R_p,
       G_link1, F_link1, N_link1, W_link1, G_link1_p, F_link1_p, N_link1_p, W_link1_p,
       G_link2, F_link2, N_link2, W_link2, G_link2_p, F_link2_p, N_link2_p, W_link2_p):
@@ -1049,27 +1024,10 @@ def _(p, i, side, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, 
              (G_link2, F_link2, N_link2, W_link2), (G_link2_p, F_link2_p, N_link2_p, W_link2_p)]
     drives = drives_by_30(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam[i - 1], f[2 + i],
                           f[i - 1], links)
-    return drives[1 if side else 0]
+    return drives[side_of(p, i, foot)]
 
 
-# What the paper states about data, validation and figures.
-
-
-@equation("section 4 data, I_1, I_1'", gives="0", unit="kg m²",
-          printed="I_1 = diag(4.3e4, 1.9e3, 4.28e4), I_1' = diag(4.53e4, 2.6e3, 4.57e4)",
-          corrected="a tenth of it (a slipped exponent); the print stays the default",
-          note="excess over m L1², the whole mass at the far end")
-def data_I1(p):
-    scale = 1
-    return [max(0, scale * I - m * p.L1**2) for I, m in (
-        (p.I_1_x, p.m_1), (p.I_1_z, p.m_1), (p.I_1p_x, p.m_1p), (p.I_1p_z, p.m_1p))]
-
-
-@data_I1.corrected
-def _(p):
-    scale = 0.1
-    return [max(0, scale * I - m * p.L1**2) for I, m in (
-        (p.I_1_x, p.m_1), (p.I_1_z, p.m_1), (p.I_1p_x, p.m_1p), (p.I_1p_z, p.m_1p))]
+# What the paper states about validation and figures.
 
 
 @equation("section 4, Figs. 11 and 13", gives="limb{i}.drive{side}.force", each={**LIMBS, **SIDES},
@@ -1077,18 +1035,18 @@ def _(p):
           printed="massless program and simulation with link masses agree to 0.1 kN",
           corrected="equal masses in both agree",
           note="the reference, with link masses, against massless equations")
-def figures(p, i, side, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, r_c, F, N, G,
+def figures(p, i, foot, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, r_c, F, N, G,
             tip, A, u, r, u_p, r_p, R, R_p):
     lam, f_X = [lam1, lam2, lam3], [0, 0, 0]
     f = limb_forces(p, R_eo, r_eo, [B1, B2, B3], lam, f_X, r_c, F, N, G)
     nothing = (Vec(0, 0, 0),) * 4
     drives = drive_forces(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam[i - 1], f[2 + i],
                           f[i - 1], [nothing] * 4)
-    return drives[1 if side else 0]
+    return drives[side_of(p, i, foot)]
 
 
 @figures.corrected
-def _(p, i, side, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, F, N, G,
+def _(p, i, foot, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, F, N, G,
       tip, A, u, r, u_p, r_p, R, R_p,
       G_link1, F_link1, N_link1, W_link1, G_link1_p, F_link1_p, N_link1_p, W_link1_p,
       G_link2, F_link2, N_link2, W_link2, G_link2_p, F_link2_p, N_link2_p, W_link2_p):
@@ -1098,7 +1056,7 @@ def _(p, i, side, R_eo, r_eo, B1, B2, B3, lam1, lam2, lam3, fx1, fx2, fx3, r_c, 
              (G_link2, F_link2, N_link2, W_link2), (G_link2_p, F_link2_p, N_link2_p, W_link2_p)]
     drives = drive_forces(p, i, tip, A, u, r, u_p, r_p, R, R_p, R_eo, lam[i - 1], f[2 + i],
                           f[i - 1], links)
-    return drives[1 if side else 0]
+    return drives[side_of(p, i, foot)]
 
 
 @equation("text to Fig. 7", gives="platform.limb{i}.B.position", each={**LIMBS, **SIDES}, unit="m",
