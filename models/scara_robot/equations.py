@@ -795,18 +795,22 @@ eq41_last = equation(
 # Forces. Q contains the weight, which the reference's inertia forces do not.
 
 
-@equation("(42)", gives="platform.inertia_force", given={"W": "platform.weight"}, unit="N",
+def without_weight(p, m, Q):
+    return Q + Vec(0.0, 0.0, m * p.g)
+
+
+@equation("(42)", gives="platform.inertia_force", unit="N",
           printed="Q = m_p g ẑ − m_p p̈", corrected="Q = −m_p g ẑ − m_p p̈, z up",
           note="the printed weight lifts the platform")
-def eq42(p, x_dd, y_dd, z_dd, W):
+def eq42(p, x_dd, y_dd, z_dd):
     Q = p.m_p * p.g * Vec(0, 0, 1) - p.m_p * Vec(x_dd, y_dd, z_dd)
-    return Q - W
+    return without_weight(p, p.m_p, Q)
 
 
 @eq42.corrected
-def _(p, x_dd, y_dd, z_dd, W):
+def _(p, x_dd, y_dd, z_dd):
     Q = -p.m_p * p.g * Vec(0, 0, 1) - p.m_p * Vec(x_dd, y_dd, z_dd)
-    return Q - W
+    return without_weight(p, p.m_p, Q)
 
 
 @equation("(42) moment", gives="platform.inertia_moment[3]", unit="N m",
@@ -825,12 +829,12 @@ ARM_MOTION = {**ARM, "theta_dd": "limb{i}.drive.acceleration"}
 
 
 @equation("(43) Q_i1", gives="limb{i}.arm.inertia_force", each=LIMBS, unit="N",
-          given={**ARM_MOTION, "W": "limb{i}.arm.weight"}, printed="Q_i1 = m_i1 (g − v̇_i1)")
-def eq43_Q(p, i, theta, theta_d, theta_dd, W):
+          given=ARM_MOTION, printed="Q_i1 = m_i1 (g − v̇_i1)")
+def eq43_Q(p, i, theta, theta_d, theta_dd):
     u_i = cos(theta) * radial(i) - Vec(0, 0, sin(theta))
     v_d = p.l1 / 2 * (theta_dd * cross(nu(i), u_i) - theta_d**2 * u_i)
     Q = p.m_arm * (Vec(0, 0, -p.g) - v_d)
-    return Q - W
+    return without_weight(p, p.m_arm, Q)
 
 
 @equation("(43) T_i1", gives="limb{i}.arm.inertia_moment", each=LIMBS, given=ARM_MOTION, unit="N m",
@@ -844,20 +848,20 @@ def eq43_T(p, i, theta, theta_d, theta_dd):
 
 
 @equation("(44), (45) Q_i2", gives="limb{i}.{rod}.inertia_force", each=RODS, unit="N",
-          given={"W": "limb{i}.{rod}.weight", **MOTION}, printed="Q_i2 = m_i2 (g − v̇_i2)",
+          given=MOTION, printed="Q_i2 = m_i2 (g − v̇_i2)",
           note="per rod")
 def eq44_Q(p, i, x, y, z, yaw, x_d, y_d, z_d, yaw_d, x_dd, y_dd, z_dd, yaw_dd,
-           t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d, t1_dd, t2_dd, t3_dd, t4_dd, W):
+           t1, t2, t3, t4, t1_d, t2_d, t3_d, t4_d, t1_dd, t2_dd, t3_dd, t4_dd):
     links = Links(p, i, [x, y, z, yaw], [x_d, y_d, z_d, yaw_d], [x_dd, y_dd, z_dd, yaw_dd],
                   [t1, t2, t3, t4], [t1_d, t2_d, t3_d, t4_d], [t1_dd, t2_dd, t3_dd, t4_dd])
     m = p.m_rods / 2 if i <= 2 else p.m_rods
     Q = m * (Vec(0, 0, -p.g) - links.a2)
-    return Q - W
+    return without_weight(p, m, Q)
 
 
 eq45_Q = equation(
     "(44), (45) Q_i2, limbs 3, 4", gives="limb{i}.rod.inertia_force", each=LAST, unit="N",
-    given={"W": "limb{i}.rod.weight", **MOTION}, printed="Q_i2 = m_i2 (g − v̇_i2)",
+    given=MOTION, printed="Q_i2 = m_i2 (g − v̇_i2)",
 )(eq44_Q.function)
 
 
