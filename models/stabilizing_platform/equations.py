@@ -302,7 +302,7 @@ def _(p, al, be, h, z0, al_d, be_d, h_d, ga, ga_d):
     return L * al_d + M * be_d + N * ga_d - tan(be) * h_d / cos(al)
 
 
-@equation("(7) γ''", gives="platform.yaw.acceleration", 
+@equation("(7) γ''", gives="platform.yaw.acceleration",
           given=of("al be al_d be_d al_dd be_dd", {**SHIP, **SHIP_D, **SHIP_DD}),
           unit="rad/s²", printed="γ'' = […]/U² (with w4 as corrected)")
 def eq7_gamma(p, al, be, al_d, be_d, al_dd, be_dd):
@@ -389,7 +389,7 @@ def eq9(p, v_p, r_ep, B, ga_d, ga_dd, a_p, v_B):
     return a + cross(epsilon, B) + cross(omega, v_B)
 
 
-@equation("(10) ω", gives="lower_platform.angular_velocity", 
+@equation("(10) ω", gives="lower_platform.angular_velocity",
           given=of("al al_d be_d", {**SHIP, **SHIP_D}), unit="rad/s",
           printed="ω_eo = α' e_x + β' e_y'")
 def eq10_omega(p, al, al_d, be_d):
