@@ -41,6 +41,7 @@ struct EquationInfo {
   std::vector<std::string> arguments;        ///< also of the corrected form; without parameters
   std::map<std::string, std::string> given;  ///< the quantity that an argument is
   std::map<std::string, std::vector<std::string>> each;  ///< values of indices
+  std::string erratum;                                   ///< "E2" or ""
   std::string printed, corrected, note, unit;            ///< to read
   double approximation = 0.0;  ///< how far it may be off as printed, in its unit
   int line = 0, end = 0;       ///< of the function as printed in the file

@@ -728,14 +728,14 @@ class _Equation:
 
 
 def equation(number, gives, given=None, each=None, printed="", corrected="", note="", unit="",
-             approximation=0.0):
+             approximation=0.0, erratum=""):
     """Decorator: a numbered equation, as printed. `gives`: the quantity that it claims to be, `given`:
     the quantity that each argument is (docs/how-to/equations.md, Quantities)."""
 
     def declare(function):
         entry = _Equation(number, gives, function,
                           dict(given=dict(given or {}), each=dict(each or {}), printed=printed,
-                               corrected=corrected, note=note, unit=unit,
+                               corrected=corrected, note=note, unit=unit, erratum=erratum,
                                approximation=approximation))
         _declared.equations.append(entry)
         return entry

@@ -301,7 +301,7 @@ class FormulaEquations final : public Equations {
         const std::string path = JoinPath(map.PathOf("ranges"), entry.key);
         const auto ends = Three(yaml, *entry.value, path, 2);
         if (ends) states_.ranges[entry.key] = {(*ends)[0], (*ends)[1]};
-        if (ends && !((*ends)[0] < (*ends)[1])) yaml->Error(*entry.value, path + " is empty");
+        if (ends && !((*ends)[0] <= (*ends)[1])) yaml->Error(*entry.value, path + " is empty");
       }
     }
     if (const YamlNode* gravity = map.Find("gravity")) {
@@ -350,14 +350,15 @@ class FormulaEquations final : public Equations {
     const auto items = yaml->Items(node, "audit");
     for (const YamlNode* item : items ? *items : std::vector<const YamlNode*>{}) {
       const YamlMap map(yaml, item, "audit",
-                        {"equation", "gives", "given", "define", "printed", "corrected", "note",
-                         "unit", "approximation"});
+                        {"equation", "erratum", "gives", "given", "define", "printed", "corrected",
+                         "note", "unit", "approximation"});
       Equation equation;
       const auto text = [&](const char* key, bool required) {
         const YamlNode* value = required ? map.Required(key) : map.Find(key);
         return value == nullptr ? std::string() : yaml->Text(*value, map.PathOf(key)).value_or("");
       };
       equation.info.number = text("equation", true);
+      equation.info.erratum = text("erratum", false);
       equation.info.gives = text("gives", true);
       equation.info.printed = text("printed", true);
       equation.info.corrected = text("corrected", false);

@@ -86,6 +86,7 @@ EquationInfo ReadEquation(const JsonValue& json) {
   for (const auto& [index, values] : json.at("each").items()) {
     for (const JsonValue& value : values.list()) equation.each[index].push_back(Word(value));
   }
+  equation.erratum = json.value("erratum", "");
   equation.printed = json.value("printed", "");
   equation.corrected = json.value("corrected", "");
   equation.note = json.value("note", "");
@@ -112,7 +113,7 @@ StatesInfo ReadStates(const JsonValue& json) {
   states.coordinates = json.at("coordinates").get<std::vector<std::string>>();
   for (const auto& [name, range] : json.at("ranges").items()) {
     const std::vector<double> ends = Numbers(range);
-    if (ends.size() != 2 || !(ends[0] < ends[1])) range.Refuse("is not [from, to]");
+    if (ends.size() != 2 || !(ends[0] <= ends[1])) range.Refuse("is not [from, to]");
     states.ranges[name] = {ends[0], ends[1]};
   }
   states.rates = NumberMap(json, "rates");

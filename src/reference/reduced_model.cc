@@ -20,22 +20,35 @@ namespace {
 // Mass matrices of worse condition, scaled to a diagonal of 1, are singular within round-off.
 constexpr double kLeastMass = 1e-14;
 
-// All coordinates as commands that stay at home. A duration says what is at rest (RestRate()).
-Motion MotionOf(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates) {
-  Motion motion;
-  for (const Coordinate& coordinate : coordinates) {
-    motion.commands.push_back({.name = "",
-                               .terms = {{coordinate, 1.0}},
-                               .profile = Constant(HomeValue(mechanism, coordinate))});
+double HomeOf(const Mechanism& mechanism, const Command& command) {
+  double home = 0.0;
+  for (const Command::Term& term : command.terms) {
+    home += term.factor * HomeValue(mechanism, term.coordinate);
   }
+  return home;
+}
+
+std::vector<Command> CommandsOf(const std::vector<Coordinate>& coordinates) {
+  std::vector<Command> commands;
+  for (const Coordinate& coordinate : coordinates) {
+    commands.push_back({.name = "", .terms = {{coordinate, 1.0}}, .profile = {}});
+  }
+  return commands;
+}
+
+// All of them stay at home. A duration says what is at rest (RestRate()).
+Motion MotionOf(const Mechanism& mechanism, std::vector<Command> commands) {
+  Motion motion;
+  for (Command& command : commands) command.profile = Constant(HomeOf(mechanism, command));
+  motion.commands = std::move(commands);
   return motion;
 }
 
 }  // namespace
 
 struct ReducedModel::Impl {
-  Impl(const Mechanism& m, const std::vector<Coordinate>& coordinates)
-      : mechanism(m), motion(MotionOf(m, coordinates)) {
+  Impl(const Mechanism& m, std::vector<Command> coordinates)
+      : mechanism(m), motion(MotionOf(m, std::move(coordinates))) {
     Begin();
   }
 
@@ -56,7 +69,9 @@ struct ReducedModel::Impl {
 };
 
 ReducedModel::ReducedModel(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates)
-    : impl_(std::make_unique<Impl>(mechanism, coordinates)) {}
+    : ReducedModel(mechanism, CommandsOf(coordinates)) {}
+ReducedModel::ReducedModel(const Mechanism& mechanism, std::vector<Command> coordinates)
+    : impl_(std::make_unique<Impl>(mechanism, std::move(coordinates))) {}
 ReducedModel::~ReducedModel() = default;
 ReducedModel::ReducedModel(ReducedModel&&) noexcept = default;
 
@@ -67,8 +82,7 @@ Eigen::Index ReducedModel::size() const {
 VecX ReducedModel::home() const {
   VecX q(size());
   for (Eigen::Index k = 0; k < q.size(); ++k) {
-    const Command& command = impl_->motion.commands[static_cast<size_t>(k)];
-    q[k] = HomeValue(impl_->mechanism, command.terms.front().coordinate);
+    q[k] = HomeOf(impl_->mechanism, impl_->motion.commands[static_cast<size_t>(k)]);
   }
   return q;
 }

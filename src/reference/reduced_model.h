@@ -30,6 +30,9 @@ class ReducedModel {
   /// `coordinates`: independent of each other at home (ChooseCoordinates()), n of them. The
   /// mechanism outlives the object.
   ReducedModel(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates);
+  /// The same with sums of coordinates (a difference of two drives); names and profiles are of no
+  /// influence.
+  ReducedModel(const Mechanism& mechanism, std::vector<Command> coordinates);
   ~ReducedModel();
   ReducedModel(ReducedModel&&) noexcept;
 

@@ -177,14 +177,23 @@ class FileAudit {
       all.push_back(std::move(joint));
     }
     const std::vector<std::string> names = NamesOf(all);
-    for (const std::string& name : info_.states.coordinates) {
-      const auto found = std::ranges::find(all, name, &NamedCoordinate::name);
-      if (found == all.end()) {
-        Error(0, fmt::format("states: {} has no coordinate '{}'", mechanism_.name, name),
-              DidYouMean(name, names));
-        continue;
+    for (const std::string& text : info_.states.coordinates) {
+      Command command{.name = text, .terms = {}, .profile = {}};
+      // "limb1.drive - limb1.drive_p"
+      const size_t minus = text.find(" - ");
+      for (const std::string& name :
+           minus == std::string::npos
+               ? std::vector<std::string>{text}
+               : std::vector<std::string>{text.substr(0, minus), text.substr(minus + 3)}) {
+        const auto found = std::ranges::find(all, name, &NamedCoordinate::name);
+        if (found == all.end()) {
+          Error(0, fmt::format("states: {} has no coordinate '{}'", mechanism_.name, name),
+                DidYouMean(name, names));
+          continue;
+        }
+        command.terms.push_back({found->coordinate, command.terms.empty() ? 1.0 : -1.0});
       }
-      coordinates_.push_back(found->coordinate);
+      coordinates_.push_back(std::move(command));
     }
     for (const auto* named : {&info_.states.rates, &info_.states.accelerations}) {
       for (const auto& [name, value] : *named) CheckNamed(name);
@@ -201,16 +210,13 @@ class FileAudit {
         }
       }
     }
-    const CoordinateChoice choice =
-        ChooseCoordinates(mechanism_, coordinates_, coordinates_.size());
-    if (choice.dependent.empty() && choice.left() == 0 &&
-        choice.chosen.size() == coordinates_.size()) {
-      return true;
-    }
+    const CommandRank rank = RankCommands(mechanism_, coordinates_);
+    if (rank.undriven == 0 && rank.redundant == 0) return true;
     Error(0,
           fmt::format("states: {} has {} degrees of freedom, and {} independent coordinates of "
                       "them are given",
-                      mechanism_.name, choice.dofs, coordinates_.size() - choice.dependent.size()),
+                      mechanism_.name, rank.dofs,
+                      static_cast<int>(coordinates_.size()) - rank.redundant),
           "coordinates are as many as there are degrees of freedom, and independent at home");
     return false;
   }
@@ -226,8 +232,9 @@ class FileAudit {
     if (const auto stated = info_.states.ranges.find(name); stated != info_.states.ranges.end()) {
       return stated->second;
     }
-    const Coordinate& c = coordinates_[k];
-    if (c.kind == Coordinate::Kind::kDrive) {
+    const Command& command = coordinates_[k];
+    const Coordinate& c = command.terms.front().coordinate;
+    if (command.terms.size() == 1 && c.kind == Coordinate::Kind::kDrive) {
       const CoordinateRange& range = mechanism_.drives[static_cast<size_t>(c.index)].range;
       if (std::isfinite(range.lower) && std::isfinite(range.upper)) {
         return {range.lower, range.upper};
@@ -235,7 +242,10 @@ class FileAudit {
     }
     const double half = IsLength(mechanism_, c) ? kDefaultRange_m * CharacteristicLength(mechanism_)
                                                 : kDefaultRange_rad;
-    const double home = HomeValue(mechanism_, c);
+    double home = 0.0;
+    for (const Command::Term& term : command.terms) {
+      home += term.factor * HomeValue(mechanism_, term.coordinate);
+    }
     return {home - half, home + half};
   }
 
@@ -465,6 +475,7 @@ class FileAudit {
     auto made = MakeCase(equation);
     if (!made) return {};
     AuditRow row{.equation = equation.number,
+                 .erratum = equation.erratum,
                  .printed = equation.printed,
                  .corrected = equation.corrected,
                  .unit = equation.unit.empty() ? "1" : equation.unit,
@@ -666,7 +677,7 @@ class FileAudit {
   EquationsInfo info_;
   Mechanism mechanism_;
   std::vector<std::string> parameter_names_;
-  std::vector<Coordinate> coordinates_;
+  std::vector<Command> coordinates_;
   std::map<std::string, AuditQuantity> usual_;
   std::vector<LoadSample> loads_;
   std::vector<AuditState> states_, slow_;  // slow: without accelerations
