@@ -330,6 +330,8 @@ def abs_(x):
 class Vec(tuple):
     """A vector: + − by element, * and / by a number, @ with a vector (dot product)."""
 
+    __array_priority__ = 100
+
     def __new__(cls, *elements):
         if len(elements) == 1 and not _is_scalar(elements[0]):
             elements = elements[0]
@@ -378,6 +380,8 @@ class Vec(tuple):
 
 class Mat(tuple):
     """A matrix, by rows: + − by element, * and / by a number, @ with a vector or a matrix, .T."""
+
+    __array_priority__ = 100
 
     def __new__(cls, *rows):
         if len(rows) == 1 and not (isinstance(rows[0], (tuple, list)) and _is_row(rows[0])):

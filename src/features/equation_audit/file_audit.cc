@@ -255,7 +255,7 @@ class FileAudit {
     const auto draw = [&] { return 2.0 * (static_cast<double>(random() >> 11) * 0x1p-53) - 1.0; };
     const auto n = static_cast<Eigen::Index>(coordinates_.size());
     ReducedModel model(mechanism_, coordinates_);
-    const int wanted = info_.states.samples;
+    const int wanted = options_.samples > 0 ? options_.samples : info_.states.samples;
     std::string last;
     for (int tries = 0; static_cast<int>(states_.size()) < wanted && tries < kTries * wanted;
          ++tries) {

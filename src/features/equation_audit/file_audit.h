@@ -13,6 +13,7 @@ namespace mbv {
 
 struct FileAuditOptions {
   bool search = true;  ///< for slips
+  int samples = 0;     ///< states; 0: as many as the file says
   std::function<void(const std::string& equation, double fraction)> progress = {};
 };
 

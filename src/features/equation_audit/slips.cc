@@ -258,9 +258,10 @@ class Editor {
       const size_t letter = row.find_first_not_of(" \t");
       if (letter == std::string_view::npos) continue;
       if (python_ && row.substr(letter).starts_with("def ")) {
-        // Behind the arguments' closing bracket; the body may begin in this line.
-        const size_t colon = row.rfind("):");
-        begin_ = at(first_line_) + (colon == std::string_view::npos ? row.size() : colon + 2);
+        begin_ = BehindHead(at(first_line_));
+        first_line_ += static_cast<int>(
+            std::count(text_.begin() + static_cast<std::ptrdiff_t>(at(first_line_)),
+                       text_.begin() + static_cast<std::ptrdiff_t>(begin_), '\n'));
         return;
       }
       if (octave_ && row.substr(letter).starts_with("function")) {
@@ -275,6 +276,16 @@ class Editor {
       const size_t colon = text_.find(':', begin_);
       if (colon < end_) begin_ = colon + 1;
     }
+  }
+
+  // The body may begin in the line of the colon behind the arguments.
+  [[nodiscard]] size_t BehindHead(size_t k) const {
+    for (int depth = 0; k < end_; ++k) {
+      const char c = text_[k];
+      depth += c == '(' || c == '[' || c == '{' ? 1 : c == ')' || c == ']' || c == '}' ? -1 : 0;
+      if (c == ':' && depth == 0) return k + 1;
+    }
+    return end_;
   }
 
   void Tokenize() {

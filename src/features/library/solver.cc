@@ -571,16 +571,18 @@ BatchStatus Solver::InverseDynamicsRows(const MatX& q, const MatX& v, const MatX
 }
 
 struct PaperEquations::Data {
-  Mechanism mechanism;
-  Motion motion;
-  ClosedFormOptions options;
-  ClosedFormFactory factory = nullptr;
-  std::vector<std::string> commands;
+  explicit Data(Prepared loaded)
+      : prepared(std::move(loaded)), commands(NamesOf(prepared.scenario.motion.commands)) {}
 
+  [[nodiscard]] const Mechanism& mechanism() const { return prepared.mechanisms.analytic; }
+  [[nodiscard]] const Motion& motion() const { return prepared.scenario.motion; }
   [[nodiscard]] std::unique_ptr<ClosedForm> Make() const {
     Diagnostics known;  // when it was loaded
-    return factory(mechanism, motion, options, &known);
+    return MakeClosedForm(prepared.scenario, mechanism(), prepared.consent, &known).closed_form;
   }
+
+  const Prepared prepared;
+  const std::vector<std::string> commands;
 };
 
 PaperEquations::PaperEquations(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
@@ -597,18 +599,13 @@ PaperEquations PaperEquations::Load(const std::string& scenario) {
   if (!prepared->has_closed_form()) refuse("no closed form: " + prepared->closed_form.reason);
   const Scenario& read = prepared->scenario;
   if (!read.motion.loads.empty()) refuse("the scenario has loads, which are functions of time");
-  auto data = std::make_shared<Data>();
-  data->mechanism = prepared->mechanisms.analytic;
-  data->motion = read.motion;
-  data->options = {.model = read.analytic.model, .as_printed = read.analytic.as_printed};
-  data->factory = FindClosedForm(data->mechanism.name)->factory;
-  data->commands = NamesOf(data->motion.commands);
+  auto data = std::make_shared<Data>(*std::move(prepared));
   return PaperEquations(std::move(data));
 }
 
 const std::vector<std::string>& PaperEquations::commands() const { return data_->commands; }
-std::vector<std::string> PaperEquations::drives() const { return NamesOf(data_->mechanism.drives); }
-double PaperEquations::duration_s() const { return data_->motion.duration_s; }
+std::vector<std::string> PaperEquations::drives() const { return NamesOf(data_->mechanism().drives); }
+double PaperEquations::duration_s() const { return data_->motion().duration_s; }
 
 void PaperEquations::MotionAt(const VecX& times_s, MatX* q, MatX* v, MatX* a) const {
   const auto n = static_cast<Eigen::Index>(data_->commands.size());
@@ -616,7 +613,7 @@ void PaperEquations::MotionAt(const VecX& times_s, MatX* q, MatX* v, MatX* a) co
   CommandSample command;
   for (Eigen::Index i = 0; i < times_s.size(); ++i) {
     if (!std::isfinite(times_s[i])) Refuse(fmt::format("times_s[{}] is not finite", i));
-    EvaluateMotion(data_->motion, times_s[i], &command);
+    EvaluateMotion(data_->motion(), times_s[i], &command);
     q->row(i) = command.position.transpose();
     v->row(i) = command.velocity.transpose();
     a->row(i) = command.acceleration.transpose();
@@ -630,7 +627,7 @@ BatchStatus PaperEquations::InverseDynamicsRows(const MatX& q, const MatX& v, co
   CheckRows("q", q, q.rows(), n);
   CheckRows("v", v, q.rows(), n);
   CheckRows("a", a, q.rows(), n);
-  const auto drives = static_cast<Eigen::Index>(data_->mechanism.drives.size());
+  const auto drives = static_cast<Eigen::Index>(data_->mechanism().drives.size());
   drive_forces->setConstant(q.rows(), drives, kNan);
   struct Block {
     std::unique_ptr<ClosedForm> form;
@@ -639,7 +636,7 @@ BatchStatus PaperEquations::InverseDynamicsRows(const MatX& q, const MatX& v, co
   };
   const auto make = [this] {
     Block block{.form = data_->Make(), .command = {}, .sample = {}};
-    EvaluateMotion(data_->motion, 0.0, &block.command);
+    EvaluateMotion(data_->motion(), 0.0, &block.command);
     return block;
   };
   return ForRows(make, q.rows(), threads, progress, [&](Block* block, Eigen::Index i) {

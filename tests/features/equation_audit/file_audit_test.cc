@@ -259,6 +259,33 @@ TEST(FileAudit, RefusesWhatItCannotUnderstand) {
   }
 }
 
+// The four papers' equations as files say what the built-in audits say: what is wrong as printed
+// has a right correction. The numbers are those of equations; some are several functions.
+TEST(FileAudit, ConfirmsThePapers) {
+  struct Paper {
+    const char* mechanism;
+    size_t rows, wrong;
+  };
+  for (const Paper& paper : {Paper{"spr_tripod", 38, 12},
+                             {"cabin_robot", 63, 28},
+                             {"scara_robot", 56, 28},
+                             {"stabilizing_platform", 49, 16}}) {
+    Diagnostics diagnostics;
+    const auto table =
+        AuditFile(SourcePath(std::string("/models/") + paper.mechanism + "/equations.py"),
+                  {.search = false, .samples = 6}, &diagnostics);
+    ASSERT_TRUE(table) << diagnostics.Text();
+    EXPECT_EQ(table->rows.size(), paper.rows) << paper.mechanism;
+    size_t wrong = 0;
+    for (const AuditRow& row : table->rows) {
+      EXPECT_TRUE(row.verdict == AuditVerdict::kOk || row.verdict == AuditVerdict::kWrong)
+          << paper.mechanism << " " << row.equation << " " << SlipsOf(row);
+      wrong += row.verdict == AuditVerdict::kWrong ? 1 : 0;
+    }
+    EXPECT_EQ(wrong, paper.wrong) << paper.mechanism;
+  }
+}
+
 // Quantities along a motion: rates are the derivatives of positions, whatever they are of.
 TEST(AuditQuantity, RatesAreDerivatives) {
   for (const char* name : {"spr_tripod", "stewart", "cabin_robot"}) {
