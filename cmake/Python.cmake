@@ -1,4 +1,4 @@
-# mbv_module(product DEPS our layers… LIBS pybind11::module FILES more of its files…): the Python package mbverify of a product's
+# mbv_module(product DEPS our layers… LIBS pybind11::module): the Python package mbverify of a product's
 # folder, in build/…/python, where PYTHONPATH finds it, and as the component "python" of the
 # installation.
 option(MBV_WITH_PYTHON "The Python package mbverify by pybind11" ON)
@@ -18,7 +18,7 @@ if(MBV_WITH_PYTHON)
 endif()
 
 function(mbv_module product)
-  cmake_parse_arguments(ARG "" "" "DEPS;LIBS;FILES" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "DEPS;LIBS" ${ARGN})
   if(NOT MBV_WITH_PYTHON)
     return()
   endif()
@@ -32,8 +32,7 @@ function(mbv_module product)
   list(TRANSFORM ARG_DEPS PREPEND mbv_)
   target_link_libraries(mbv_python PRIVATE ${ARG_DEPS} ${ARG_LIBS})
   file(GLOB files CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${product}/mbverify/*.py*)
-  list(TRANSFORM ARG_FILES PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
-  list(APPEND files ${ARG_FILES})
+  list(APPEND files ${CMAKE_CURRENT_SOURCE_DIR}/src/equations/equations.py)
   file(COPY ${files} DESTINATION ${package})
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${files})
   install(FILES ${files} DESTINATION ${MBV_PYTHON_SITE}/mbverify COMPONENT python)

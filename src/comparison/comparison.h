@@ -92,7 +92,7 @@ struct ComparisonInput {
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
   std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
-  std::string unchecked_coverage = {};  ///< why nobody knows what the analytic witness covers
+  std::string unchecked_coverage = {};     ///< why nobody knows what the analytic witness covers
   /// The witnesses bring stiffnesses instead of traces; the motion is the pose, commanded.
   bool of_stiffness = false;
 };

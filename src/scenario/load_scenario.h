@@ -54,9 +54,9 @@ class ScenarioMemory;
 /// Only the mechanism name, description and `expect:` of a file, even if the rest is wrong. A file
 /// that is not YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
-  bool is_scenario = false;    ///< has a `mechanism:` key (or an expectation)
+  bool is_scenario = false;     ///< has a `mechanism:` key (or an expectation)
   bool names_programs = false;  ///< witnesses or a file of equations
-  std::string kind;            ///< "motion", "stiffness"; "" means motion
+  std::string kind;             ///< "motion", "stiffness"; "" means motion
   std::string mechanism, description;
   Expectation expect;
   std::vector<std::string> keys = {};  ///< at the file's top

@@ -30,7 +30,8 @@ struct AnalyticSettings {
   std::string model;                    ///< formulation; "" is the mechanism's default
   std::vector<std::string> as_printed;  ///< errata left uncorrected on purpose
   Overrides parameters;                 ///< perturb this witness only
-  /// The user's file of equations, as a path, in the place of the mechanism's closed form; "": none.
+  /// The user's file of equations, as a path, in the place of the mechanism's closed form; "":
+  /// none.
   std::string equations;
   bool equations_typed = false;  ///< the file is the user's, of an option
   int equations_line = 0;        ///< in the scenario; 0: unknown

@@ -79,7 +79,8 @@ AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node) {
   }
   settings.stated = true;
   YamlReader& yaml = values->yaml();
-  YamlMap map(&yaml, node, "analytic", {"model", "as_printed", "parameters", "required", "equations"});
+  YamlMap map(&yaml, node, "analytic",
+              {"model", "as_printed", "parameters", "required", "equations"});
   if (const YamlNode* flag = map.Find("required")) {
     settings.required = yaml.Flag(*flag, "analytic.required").value_or(false);
   }

@@ -63,7 +63,7 @@ struct ProgramConsent {
   bool all = false;       ///< --trust
   bool archived = false;  ///< scenarios come from an archive: neither place nor owner is a reason
   std::set<std::string> agreed = {};  ///< fingerprints of lists
-  bool none = false;      ///< nothing runs, trusted or not
+  bool none = false;                  ///< nothing runs, trusted or not
 
   [[nodiscard]] bool Allows(const ProgramList& list) const;
 };

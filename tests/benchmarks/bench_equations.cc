@@ -15,8 +15,8 @@ void OwnEquations(benchmark::State& state, const std::string& scenario, const st
   MBV_DEMAND(loaded.scenario && loaded.mechanism, loaded.diagnostics.Text());
   const Motion& motion = loaded.scenario->motion;
   Diagnostics found;
-  const FileForm form = MakeFileForm(SourcePath("/examples/equations/" + file), *loaded.mechanism,
-                                     motion, &found);
+  const FileForm form =
+      MakeFileForm(SourcePath("/examples/equations/" + file), *loaded.mechanism, motion, &found);
   if (form.closed_form == nullptr) return state.SkipWithError(found.Text().c_str());
   CommandSample command;
   ClosedFormSample sample;

@@ -221,7 +221,7 @@ end
 
 function [entry, info] = read_equation(eq, source, text)
   known = {'number', 'gives', 'function', 'given', 'each', 'printed', 'corrected', ...
-           'corrected_text', 'note', 'unit', 'approximation'};
+           'corrected_text', 'note', 'unit', 'approximation', 'erratum'};
   for name = fieldnames(eq).'
     if (~any(strcmp(name{1}, known)))
       error('mbverify:host', 'equation: there is no field ''%s''; known are %s', name{1}, ...
@@ -269,6 +269,7 @@ function [entry, info] = read_equation(eq, source, text)
   info.note = field_or(eq, 'note', '');
   info.unit = field_or(eq, 'unit', '');
   info.approximation = field_or(eq, 'approximation', 0);
+  info.erratum = field_or(eq, 'erratum', '');
 end
 
 function states = read_states(given)

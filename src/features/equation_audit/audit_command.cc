@@ -112,8 +112,8 @@ nlohmann::ordered_json TableJson(const AuditTable& table) {
 std::string AuditPage(const AuditTable& table) {
   ReportSection section{.title = "Equations", .link = "Equations"};
   Table rows{.name = "equations",
-             .columns = {Text("equation"), Text("verdict"), Wide("as printed"), Wide("right with"),
-                         Digits("off by"), Digits("size"), Wide("note")}};
+             .columns = {Text("equation"), Text("verdict"), Wide("as printed"), Wide("corrected"),
+                         Wide("right with"), Digits("off by"), Digits("size"), Wide("note")}};
   size_t wrong = 0;
   for (const AuditRow& row : table.rows) {
     const bool bad = IsWrong(row.verdict) || row.verdict == AuditVerdict::kWrong;
@@ -122,13 +122,14 @@ std::string AuditPage(const AuditTable& table) {
                       : row.verdict == AuditVerdict::kOk          ? Mark::kOk
                       : row.verdict == AuditVerdict::kNotTestable ? Mark::kOff
                                                                   : Mark::kWarn;
-    std::string right = row.corrected;
+    std::string right;
     for (const std::string& slip : row.slips) right += (right.empty() ? "" : "; ") + slip;
-    rows.rows.push_back({row.equation, Cell(ToText(row.verdict), mark), row.printed, right,
-                         std::isnan(row.residual_printed)
-                             ? std::string("not evaluated")
-                             : fmt::format("{:.2e}", row.residual_printed),
-                         fmt::format("{:.3g} {}", row.scale, row.unit), row.note});
+    const std::string unit = row.unit == "1" ? "" : " " + row.unit;
+    rows.rows.push_back(
+        {row.equation, Cell(ToText(row.verdict), mark), row.printed, row.corrected, right,
+         std::isnan(row.residual_printed) ? std::string("not evaluated")
+                                          : fmt::format("{:.2e}", row.residual_printed),
+         fmt::format("{:.3g}{}", row.scale, unit), row.note});
   }
   section.Add(std::move(rows));
   section.Note(

@@ -519,7 +519,7 @@ class Editor {
     edits_.back().kind = TextEdit::Kind::kFactorSign;
     add("times 1/2", "(0.5*" + value + ")");
     add("times 2", "(2*" + value + ")");
-    add("squared", "(" + value + power + "2)");
+    if (tokens_[t].kind != Kind::kNumber) add("squared", "(" + value + power + "2)");
     if (InTrigonometric(t)) {
       add("in degrees", fmt::format("({}*{:.17g})", value, kDegree));
       add("in radians", fmt::format("({}*{:.17g})", value, 1.0 / kDegree));

@@ -604,7 +604,9 @@ PaperEquations PaperEquations::Load(const std::string& scenario) {
 }
 
 const std::vector<std::string>& PaperEquations::commands() const { return data_->commands; }
-std::vector<std::string> PaperEquations::drives() const { return NamesOf(data_->mechanism().drives); }
+std::vector<std::string> PaperEquations::drives() const {
+  return NamesOf(data_->mechanism().drives);
+}
 double PaperEquations::duration_s() const { return data_->motion().duration_s; }
 
 void PaperEquations::MotionAt(const VecX& times_s, MatX* q, MatX* v, MatX* a) const {
