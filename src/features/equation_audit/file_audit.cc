@@ -455,6 +455,7 @@ class FileAudit {
         vectors.emplace_back(name, Vec3(value.values.data()));
       }
     }
+    AddParameterTerms(k, size, arguments, made);
     if (size != 3) return;
     for (size_t i = 0; i < vectors.size(); ++i) {
       for (size_t j = 0; j < vectors.size(); ++j) {
@@ -463,6 +464,21 @@ class FileAudit {
         if (i < j) AddVector(fmt::format("{} × {}", a, b), x.cross(y), made);
         if (i != j) AddVector(fmt::format("{} × ({} × {})", a, a, b), x.cross(x.cross(y)), made);
         AddVector(fmt::format("({}·{}) {}", a, b, a), x.dot(y) * x, made);
+      }
+    }
+  }
+  // A parameter, and a parameter times what is given.
+  void AddParameterTerms(size_t k, size_t size,
+                         const std::vector<std::pair<std::string, AuditQuantity>>& arguments,
+                         Case* made) {
+    for (const Parameter& parameter : mechanism_.parameters) {
+      if (parameter.value == 0.0 || parameter.value == 1.0) continue;
+      if (size == 1) AddTerm(parameter.name, {parameter.value}, made);
+      for (const auto& [name, given] : arguments) {
+        std::vector<double> values = given.At(states_[k]).values;
+        if (values.size() != size) continue;
+        for (double& value : values) value *= parameter.value;
+        AddTerm(fmt::format("{} {}", parameter.name, name), std::move(values), made);
       }
     }
   }

@@ -131,6 +131,8 @@ TEST(FileAudit, NamesPlantedSlips) {
             "w × (w × a)"},
            {"rod.com.velocity", kVectors, "v, w, a", "return v + cross(a, w)",
             "'-' for '+' in front of 'cross(a, w)'"},
+           {"rod.inertia_moment[3]", "'al': 'rod.angular_acceleration[3]'", "al",
+            "return -p.I_rod * al - p.I_crank * al", "plus I_crank al"},
            // A missing dot.
            {"crank.angular_velocity[3]", "", "motor, motor_d", "return motor + 0 * motor_d",
             "'motor_d' for 'motor'"},
