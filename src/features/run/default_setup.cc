@@ -408,6 +408,8 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
 Mechanism WithDriveForEachDof(const Mechanism& mechanism, std::vector<std::string>* notes,
                               std::vector<Coordinate>* by_forces) {
   Mechanism m = mechanism;
+  // Here nobody gives their motion: drives hold them like the others.
+  m.prescribed.clear();
   const std::vector<Coordinate> candidates = Candidates(m);
   const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
   std::vector<Coordinate> taken;

@@ -130,7 +130,16 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   return true;
 }
 
-// A robot's file is run by a first motion; its model and scenario are left to go on from.
+// A model file, which has no motion of its own.
+bool IsModelFile(const std::string& file) {
+  const ScenarioHead head = ReadScenarioHead(file);
+  return !head.is_scenario && head.HasKey("name") &&
+         (head.HasKey("bodies") || head.HasKey("parts") || head.HasKey("legs") ||
+          head.HasKey("urdf"));
+}
+
+// A robot's file, or a model, is run by a first motion; its model and scenario are left to go on
+// from.
 bool SetUpRobot(const std::string& robot, const RunArguments& arguments, FindingPrinter* findings,
                 std::string* scenario) {
   LoadOptions options;
@@ -195,7 +204,8 @@ int Run(const RunArguments& arguments) {
     const bool floats = arguments.robot.free_base || !arguments.robot.plants.empty();
     options.source_model =
         given.ends_with(".xml") && !arguments.no_source_model && !floats ? given : "";
-    if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
+    if ((IsRobotFile(given) || IsModelFile(given)) &&
+        !SetUpRobot(given, arguments, &findings, &file)) {
       exit_code = WorseExit(exit_code, 2);
       counts += RunCounts{.scenarios = 1, .bad_input = 1};
       results.push_back({{"scenario_file", given}, {"exit_code", 2}});
@@ -223,7 +233,8 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<RunArguments>();
   CLI::App* run = app->add_subcommand("run", "Compare analytic, reference and simulated forces");
   run->add_option("scenario", arguments->scenarios,
-                  "scenario files, folders of them, or robots (.urdf, MJCF as .xml, .sdf)")
+                  "scenario files, folders of them, models (model.yaml), or robots (.urdf, MJCF as "
+                  ".xml, .sdf)")
       ->required();
   run->add_option("--out", arguments->out, "folder for results")->capture_default_str();
   run->add_option("--mode", arguments->mode, "overrides the scenario's simulation mode")
