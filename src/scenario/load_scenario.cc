@@ -135,6 +135,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
       const fs::path found = folder / path;
       if (!fs::is_regular_file(found, error)) continue;
       name = found.lexically_normal().string();
+      NoteInput(name, ReadWholeFile(name).value_or(""));
       return;
     }
     // An option's file may lie in the working directory.

@@ -118,7 +118,8 @@ ClosedFormChoice MakeFromFile(const Scenario& scenario, const Mechanism& mechani
   if (consent.none && !program.programs.empty()) {
     return {nullptr, "its equations are a program, which is not run here"};
   }
-  if (!consent.Allows(program)) {
+  // Agreed to is a scenario's whole list.
+  if (!consent.Allows(program) && !consent.Allows(ProgramsOf(scenario, consent.archived))) {
     Finding refusal = Refusal(program);
     refusal.severity = Severity::kWarning;
     diagnostics->Add(std::move(refusal));

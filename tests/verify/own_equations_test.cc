@@ -4,11 +4,13 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <sstream>
 
 #include "base/files.h"
 #include "base/worker_pool.h"
 #include "features/run/run_scenario.h"
+#include "tests/support/run_program.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_folder.h"
 #include "verify/check_file.h"
@@ -134,6 +136,19 @@ TEST_F(OwnEquations, RunAfterConsentOnly) {
   EXPECT_TRUE(ran());
 }
 
+// Whoever agrees to all programs of a scenario agrees to its equations.
+TEST_F(OwnEquations, BelongToWhatWasAgreedTo) {
+  const std::string file = Write("return [torque]");
+  std::ofstream(file, std::ios::app) << "witnesses: {idle: {command: [/bin/true]}}\n";
+  RunOptions options;
+  options.programs.agreed = {ProgramsOf(file, {}).Fingerprint()};
+  const RunOutcome outcome = RunScenario(file, options);
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.report->driven_by, "analytic");
+  options.programs.agreed = {"another"};
+  EXPECT_EQ(RunScenario(file, options).exit_code, 2);
+}
+
 // What examples/equations/ shows: four mechanisms, in Python and partly in Octave.
 TEST(OwnEquationsExamples, AgreeInFortyLines) {
   size_t ran = 0;
@@ -170,6 +185,37 @@ TEST(OwnEquationsExamples, AgreeInFortyLines) {
     ++ran;
   }
   EXPECT_GE(ran, 5u);
+}
+
+// The file goes into an archive, and runs from it after consent.
+TEST(OwnEquationsExamples, ArePackedAndRepeated) {
+  const Program mbverify("own_equations");
+  const std::string zip = (mbverify.folder() / "delta.zip").string();
+  const ProgramResult packed = mbverify("package examples/equations/delta.yaml --trust -o " + zip);
+  ASSERT_EQ(packed.exit_code, 0) << packed.err;
+  EXPECT_EQ(mbverify("package --check " + zip).exit_code, 2);
+  const ProgramResult repeated = mbverify("package --check " + zip + " --trust");
+  EXPECT_EQ(repeated.exit_code, 0) << repeated.out << repeated.err;
+}
+
+// A study asks its processes for them, each its own; where they may not run, it says so.
+TEST(OwnEquationsExamples, EnterStudies) {
+  const Program mbverify("own_study");
+  const std::string folder = mbverify.folder().string();
+  fs::copy(SourcePath("/examples/equations"), folder + "/equations", fs::copy_options::recursive);
+  std::ofstream(folder + "/study.yaml")
+      << "study: rods\nscenario: equations/delta.yaml\n"
+         "vary: {m_rod: {uniform: {plus_minus_percent: 5}}}\ndesign: {sobol: 4}\n"
+         "witnesses: [analytic, reference]\nquantities: [limb1.motor.force.rms]\n";
+  const std::string run = "XDG_CONFIG_HOME=" + folder + "/config $mbverify study " + folder +
+                          "/study.yaml --out " + folder + "/out";
+  const ProgramResult refused = mbverify.Script(run);
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_NE(refused.err.find("may not run"), std::string::npos) << refused.err;
+  const ProgramResult trusted = mbverify.Script("XDG_CONFIG_HOME=" + folder +
+                                                "/config $mbverify trust " + folder + " && " + run);
+  EXPECT_EQ(trusted.exit_code, 0) << trusted.err;
+  EXPECT_NE(trusted.out.find("disagree at 0 of 4 points"), std::string::npos) << trusted.out;
 }
 
 // Formulas are no program.
