@@ -3,6 +3,7 @@
 #include <array>
 
 #include "cli/run_cli.h"
+#include "equations/equations.h"
 #include "features/run/run_scenario.h"
 #include "features/stiffness/stiffness.h"
 #include "features/study/study.h"
@@ -77,6 +78,15 @@ bool IsStudy(const std::string& /*file*/, const ScenarioHead& head) {
 bool IsStiffness(const std::string& /*file*/, const ScenarioHead& head) {
   return head.is_scenario && head.kind == "stiffness";
 }
+bool IsEquations(const std::string& /*file*/, const ScenarioHead& head) {
+  return !head.is_scenario && (head.HasKey("equations_of") || head.HasKey("audit"));
+}
+// Its formulas are compiled where the parameters are known.
+Diagnostics CheckEquations(const std::string& file) {
+  Diagnostics diagnostics;
+  (void)OpenEquations(file, &diagnostics);
+  return diagnostics;
+}
 bool IsScenario(const std::string& /*file*/, const ScenarioHead& head) { return head.is_scenario; }
 bool IsAny(const std::string& /*file*/, const ScenarioHead& /*head*/) { return true; }
 
@@ -96,6 +106,7 @@ constexpr std::array kDocuments = {
                  .in_time = true,
                  .run = RunMotion,
                  .mechanism = MotionMechanism},
+    DocumentKind{.name = "equations", .is = IsEquations, .check = CheckEquations},
     DocumentKind{.name = "model", .is = IsAny, .check = CheckModel},
 };
 

@@ -164,10 +164,7 @@ class FormulaEquations final : public Equations {
     YamlReader yaml(file_);
     root_ = yaml.Parse(text_);
     if (root_ != nullptr) {
-      const YamlNode* inside = root_->is_map() ? root_->Find("equations") : nullptr;
-      const YamlNode* name = inside == nullptr ? nullptr : root_->Find("name");
-      ReadAll(&yaml, inside == nullptr ? *root_ : *inside,
-              name != nullptr && name->is_scalar() ? name->text : "");
+      ReadAll(&yaml, *root_);
     }
     if (!yaml.has_errors()) return;
     failed_ = EquationFailure{.kind = EquationFailure::Kind::kWrong,
@@ -176,13 +173,13 @@ class FormulaEquations final : public Equations {
     failed_->findings = yaml.diagnostics().findings();
   }
 
-  void ReadAll(YamlReader* yaml, const YamlNode& node, const std::string& mechanism) {
+  void ReadAll(YamlReader* yaml, const YamlNode& node) {
     YamlMap map(yaml, &node, "",
-                {"mechanism", "commands", "define", "drives", "rates", "forces", "outputs",
+                {"equations_of", "commands", "define", "drives", "rates", "forces", "outputs",
                  "covers", "states", "audit"});
     if (!map.valid()) return;
     if (const YamlNode* states = map.Find("states")) ReadStates(yaml, *states);
-    if (map.Has("drives") || map.Has("forces")) ReadForm(yaml, map, mechanism);
+    if (map.Has("drives") || map.Has("forces")) ReadForm(yaml, map);
     if (const YamlNode* audit = map.Find("audit")) ReadAudit(yaml, *audit);
     if (forms_.empty() && equations_.empty() && !yaml->has_errors()) {
       yaml->Error(node, "has neither a closed form nor an audit",
@@ -190,13 +187,10 @@ class FormulaEquations final : public Equations {
     }
   }
 
-  void ReadForm(YamlReader* yaml, const YamlMap& map, const std::string& mechanism) {
+  void ReadForm(YamlReader* yaml, const YamlMap& map) {
     Form form;
-    form.info.mechanism = mechanism;
-    if (const YamlNode* name = map.Find("mechanism")) {
-      form.info.mechanism = yaml->Text(*name, "mechanism").value_or("");
-    } else if (mechanism.empty()) {
-      (void)map.Required("mechanism");
+    if (const YamlNode* name = map.Required("equations_of")) {
+      form.info.mechanism = yaml->Text(*name, "equations_of").value_or("");
     }
     if (const YamlNode* commands = map.Required("commands")) ReadCommands(yaml, *commands, &form);
     form.info.line = map.node()->line;

@@ -29,7 +29,7 @@ struct EquationLanguage {
 
 [[nodiscard]] std::shared_ptr<Equations> MakeProgramEquations(const std::string& file,
                                                               const EquationLanguage& language);
-/// Formulas of a YAML file: of its top, or below its key `equations`.
+/// Formulas of a YAML file.
 [[nodiscard]] std::shared_ptr<Equations> MakeFormulaEquations(const std::string& file,
                                                               const std::string& text);
 

@@ -60,7 +60,7 @@ def slider(p, theta):
 )";
 
 const char* const kFormulas = R"(
-mechanism: planar_slider_crank
+equations_of: planar_slider_crank
 commands: {theta: motor}
 define:
   phi: -asin(r/l*sin(theta))
@@ -231,7 +231,7 @@ TEST(FileForm, RefusesWrongFiles) {
            {"a.py", Replaced(head, "planar", "round") + "    return [0]\n",
             "declares closed forms of round_slider_crank, not of planar_slider_crank", 0},
            {"a.yaml", "a: [", "", 1},
-           {"a.yaml", Replaced(yaml, "mechanism: ", "mechanisms: "), "unknown key 'mechanisms'", 2},
+           {"a.yaml", Replaced(yaml, "equations_of: ", "equation_of: "), "unknown key 'equation_of'", 2},
            {"a.yaml", Replaced(yaml, "r/2*cos(theta)", "r/2*cos(teta)"), "'teta' is not known", 6},
            {"a.yaml", Replaced(yaml, "crank.mass:", "crnk.mass:"), "is no quantity", 0},
            {"a.yaml", Replaced(yaml, "[0, -g, null]", "[0, -g]"), "has 2 numbers", 0},

@@ -221,7 +221,7 @@ TEST(OwnEquationsExamples, EnterStudies) {
 // Formulas are no program.
 TEST_F(OwnEquations, NeedNoConsentAsFormulas) {
   folder_.Write("crank.yaml",
-                "mechanism: planar_slider_crank\ncommands: [motor]\ndrives: {motor: motor}\n"
+                "equations_of: planar_slider_crank\ncommands: [motor]\ndrives: {motor: motor}\n"
                 "forces: {motor: 0}\ncovers: unchecked\n");
   const std::string file = Write("", "crank.py");
   const std::string text = ReadWholeFile(file).value();
