@@ -89,6 +89,7 @@ pid_t Start(const WorkerJob& job, std::string* trouble, int in = -1, int out = -
   }
   const auto pointers = [](const std::vector<std::string>& words) {
     std::vector<char*> all;
+    all.reserve(words.size() + 1);
     for (const std::string& word : words) all.push_back(const_cast<char*>(word.c_str()));
     all.push_back(nullptr);
     return all;

@@ -30,6 +30,7 @@ double HomeOf(const Mechanism& mechanism, const Command& command) {
 
 std::vector<Command> CommandsOf(const std::vector<Coordinate>& coordinates) {
   std::vector<Command> commands;
+  commands.reserve(coordinates.size());
   for (const Coordinate& coordinate : coordinates) {
     commands.push_back({.name = "", .terms = {{coordinate, 1.0}}, .profile = {}});
   }

@@ -104,10 +104,11 @@ class NumberSlips {
                                  : fmt::format("the whole times {}", factor.text));
       }
     }
-    for (const auto& [power, text] : {std::pair{2.0, "the square"}, std::pair{0.5, "the root"}}) {
-      if (Right([&](size_t row, size_t k) { return std::pow(s_.printed[row][k], power); })) {
-        Add(std::string(text) + " of the whole");
-      }
+    if (Right([&](size_t row, size_t k) { return s_.printed[row][k] * s_.printed[row][k]; })) {
+      Add("the square of the whole");
+    }
+    if (Right([&](size_t row, size_t k) { return std::sqrt(s_.printed[row][k]); })) {
+      Add("the root of the whole");
     }
   }
 
@@ -468,9 +469,8 @@ class Editor {
       const auto close = Closing(t);
       if (!close) return {};
       last = *close;
-    } else if (kind != Kind::kName && kind != Kind::kNumber) {
-      return {};
-    } else if (kind == Kind::kName && IsKeyword(Word(tokens_[t])) && !IsWord(t, "p")) {
+    } else if (kind != Kind::kNumber &&
+               (kind != Kind::kName || (IsKeyword(Word(tokens_[t])) && !IsWord(t, "p")))) {
       return {};
     }
     while (last + 1 < tokens_.size()) {
