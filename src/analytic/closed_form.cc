@@ -11,6 +11,10 @@ ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
                             ClosedForm* closed_form) {
   ClosedFormRun run;
   std::vector<Channel> channels = DriveChannels(mechanism);
+  const bool forces = closed_form->gives_forces();
+  if (!forces) {
+    std::erase_if(channels, [](const Channel& c) { return c.quantity == Quantity::kForce; });
+  }
   for (Channel& channel : closed_form->extra_channels()) channels.push_back(std::move(channel));
   run.trace.witness = role::kAnalytic.name;
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
@@ -30,7 +34,7 @@ ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
       row[columns(Quantity::kPosition, d)] = sample.driven.position[k];
       row[columns(Quantity::kVelocity, d)] = sample.driven.velocity[k];
       row[columns(Quantity::kAcceleration, d)] = sample.driven.acceleration[k];
-      row[columns(Quantity::kForce, d)] = sample.force[k];
+      if (forces) row[columns(Quantity::kForce, d)] = sample.force[k];
     }
     row.tail(sample.extra.size()) = sample.extra.transpose();
   }

@@ -42,6 +42,9 @@ class ClosedForm {
   /// Signals with the same name in another witness are compared.
   [[nodiscard]] virtual std::vector<Channel> extra_channels() const = 0;
 
+  /// False: equations of motion alone. Then `force` of a sample stays empty.
+  [[nodiscard]] virtual bool gives_forces() const { return true; }
+
   /// Positions, velocities and accelerations of everything driven. No allocation once `driven`
   /// has its size.
   [[nodiscard]] virtual RunSummary Kinematics(const CommandSample& command,

@@ -167,7 +167,10 @@ std::string WhyNothingInCommon(const ComparisonInput& input, const Comparison& c
 
 // The drives whose forces a program does not give; "" if it gives all of them, or none.
 std::string ForcesLeftOut(const ComparisonInput& input, const Witness& witness) {
-  if (!witness.foreign || witness.trace == nullptr || !witness.summary.ok()) return "";
+  const bool analytic = witness.name == role::kAnalytic;
+  if ((!witness.foreign && !analytic) || witness.trace == nullptr || !witness.summary.ok()) {
+    return "";
+  }
   if (input.motion->free()) return "";
   std::vector<std::string> left_out;
   for (const Drive& drive : input.mechanism->drives) {
@@ -175,7 +178,10 @@ std::string ForcesLeftOut(const ComparisonInput& input, const Witness& witness) 
       left_out.push_back(drive.name);
     }
   }
-  if (left_out.empty() || left_out.size() == input.mechanism->drives.size()) return "";
+  if (left_out.empty()) return "";
+  if (left_out.size() == input.mechanism->drives.size()) {
+    return analytic ? "its equations give no forces: its motion alone is compared" : "";
+  }
   return "it gives no force of " + Joined(left_out);
 }
 

@@ -1013,9 +1013,14 @@ def _kind(error):
 
 
 def _serve(path):
-    """Answers on what was standard output; whatever the file prints goes to standard error."""
+    """Answers on what was standard output; whatever the file prints goes to standard error, and
+    there is nothing for it to read."""
+    calls = os.fdopen(os.dup(0), encoding="utf-8")
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
     os.dup2(2, 1)
+    sys.stdin = open(nothing, encoding="utf-8")
     sys.stdout = sys.stderr
     folder = os.path.dirname(os.path.abspath(path))
     sys.path.insert(0, folder)
@@ -1026,7 +1031,7 @@ def _serve(path):
     sys.modules["mbverify"] = package
     sys.modules["mbverify.equations"] = sys.modules[__name__]
     host = _Host(path)
-    for line in sys.stdin:
+    for line in calls:
         call = json.loads(line)
         name = call.pop("do")
         try:

@@ -95,6 +95,8 @@ class FileClosedForm final : public ClosedForm {
 
   [[nodiscard]] std::vector<Channel> extra_channels() const override { return channels_; }
 
+  [[nodiscard]] bool gives_forces() const override { return info_.has_forces; }
+
   [[nodiscard]] RunSummary Kinematics(const CommandSample& command, DrivenSample* driven) override {
     return At(command, false, driven, nullptr);
   }
@@ -190,9 +192,9 @@ class FileClosedForm final : public ClosedForm {
       return NotFinite(command.time_s, "the motion of a drive");
     }
     if (sample == nullptr) return RunSummary::Done();
-    sample->force.resize(drives);
-    for (Eigen::Index d = 0; d < drives; ++d) {
-      sample->force[d] = values.forces.empty() ? kNan : values.forces[static_cast<size_t>(d)];
+    sample->force.resize(info_.has_forces ? drives : 0);
+    for (Eigen::Index d = 0; d < sample->force.size(); ++d) {
+      sample->force[d] = values.forces[static_cast<size_t>(d)];
     }
     sample->extra.resize(static_cast<Eigen::Index>(values.outputs.size()));
     for (size_t k = 0; k < values.outputs.size(); ++k) {
@@ -406,7 +408,7 @@ class FileFormMaker {
       if (places_.empty() && !form.commands.empty()) continue;
       index_ = k;
       form_ = form;
-      return CheckForm();
+      return true;
     }
     if (takes.empty()) {
       Finding finding =
@@ -424,15 +426,6 @@ class FileFormMaker {
                   fmt::format("its closed form takes {}, and the motion commands {}",
                               fmt::format("{}", fmt::join(takes, "; or ")), Joined(commands)),
                   ""));
-    return false;
-  }
-
-  bool CheckForm() {
-    if (form_.has_forces) return true;
-    Finding finding = Uncovered(file_, form_.line, "the closed form has no forces",
-                                "@closed_form.forces gives those of all drives");
-    finding.severity = Severity::kError;
-    diagnostics_->Add(std::move(finding));
     return false;
   }
 

@@ -140,6 +140,13 @@ ClosedFormChoice MakeFromFile(const Scenario& scenario, const Mechanism& mechani
     return choice;
   }
   if (made.closed_form == nullptr) return {nullptr, "its equations do not work"};
+  const SimulationSettings& simulation = scenario.simulation;
+  const bool by_forces = simulation.mode == DriveMode::kForceDriven ||
+                         (simulation.mode == DriveMode::kServo && simulation.servo.feedforward);
+  if (!made.closed_form->gives_forces() && simulation.on && by_forces) {
+    return {nullptr, "its equations give no forces, and these would move the simulation",
+            WitnessGap::kNotApplicable};
+  }
   ClosedFormChoice choice{std::move(made.closed_form), ""};
   choice.unchecked = std::move(made.unchecked);
   return choice;

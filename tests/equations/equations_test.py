@@ -219,6 +219,9 @@ def tip(p, theta):
             ("def f(:\n", "exception", "SyntaxError"),
             ("import no_such_module\n", "exception", "ModuleNotFoundError"),
             ("raise SystemExit(3)\n", "exception", "SystemExit"),
+            ("x = input()\n", "exception", "EOFError"),
+            ("import os\nif not os.read(0, 10): raise ValueError('nothing')\n", "exception",
+             "nothing"),
             ("import mbverify\nmbverify.load('stewart')\n", "exception", "AttributeError"),
         ):
             (answer,) = self.answers(text, {"do": "load"})

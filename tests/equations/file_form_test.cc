@@ -227,7 +227,6 @@ TEST(FileForm, RefusesWrongFiles) {
            {"a.py", head + "    return ['a']\n", "gave a str where a number is wanted", 0},
            {"a.py", head + "    pass\n", "gave None: is there a return?", 0},
            {"a.py", head + "    return [p.m_crnk]\n", "the model has no parameter 'm_crnk'", 7},
-           {"a.py", head.substr(0, head.find("@closed_form.f")), "has no forces", 2},
            {"a.py", Replaced(head, "planar", "round") + "    return [0]\n",
             "declares closed forms of round_slider_crank, not of planar_slider_crank", 0},
            {"a.yaml", "a: [", "", 1},

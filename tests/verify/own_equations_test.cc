@@ -22,6 +22,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+std::string Replaced(std::string text, const std::string& what, const std::string& with) {
+  const size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return text.replace(at, what.size(), with);
+}
+
 // A four-bar whose crank is commanded; `forces` is the body of the file's function.
 class OwnEquations : public testing::Test {
  protected:
@@ -134,6 +140,41 @@ TEST_F(OwnEquations, RunAfterConsentOnly) {
   EXPECT_EQ(ProgramsOf(file, {}).Lines().size(), 1u);
   EXPECT_EQ(Run(file, false).exit_code, 0);
   EXPECT_TRUE(ran());
+}
+
+// Equations of motion alone: they drive the simulation and are judged by it, forces are compared
+// among the others.
+TEST_F(OwnEquations, MayGiveNoForces) {
+  const std::string file = Write("return [torque]");
+  const std::string code = folder_.PathOf("crank.py");
+  const std::string text = ReadWholeFile(code).value();
+  std::ofstream(code) << text.substr(0, text.find("@closed_form.forces"));
+  const RunOutcome outcome = Run(file);
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  const Comparison& comparison = outcome.report->comparison;
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree) << comparison.reason;
+  EXPECT_EQ(outcome.report->driven_by, "analytic");
+  bool said = false;
+  for (const Caveat& caveat : comparison.caveats) {
+    said = said || caveat.text.find("give no forces") != std::string::npos;
+  }
+  EXPECT_TRUE(said);
+  const PairComparison* pair = comparison.FindPair("simulated_vs_reference");
+  ASSERT_NE(pair, nullptr);
+  EXPECT_LT(pair->metrics.at(Metric::kForceNrmse).value, 1e-10);
+  // Where forces move the simulation, they are the reference's.
+  RunOptions options;
+  options.programs.all = true;
+  options.scenario.set = {{"simulation", "{mode: force_driven, step_s: 0.001}"}};
+  const RunOutcome driven = RunScenario(file, options);
+  ASSERT_TRUE(driven.report) << driven.diagnostics.Text();
+  EXPECT_EQ(driven.report->driven_by, "reference");
+  // A wrong position is seen all the same.
+  std::ofstream(code) << Replaced(text.substr(0, text.find("@closed_form.forces")),
+                                  "return [theta]", "return [theta + 1e-6 * sin(theta)]");
+  const RunOutcome wrong = Run(file);
+  ASSERT_TRUE(wrong.report) << wrong.diagnostics.Text();
+  EXPECT_EQ(wrong.report->comparison.verdict, Verdict::kDisagree);
 }
 
 // Whoever agrees to all programs of a scenario agrees to its equations.

@@ -598,6 +598,7 @@ PaperEquations PaperEquations::Load(const std::string& scenario) {
   if (!prepared) throw InputError(NotesOf(found));
   if (!prepared->has_closed_form()) refuse("no closed form: " + prepared->closed_form.reason);
   const Scenario& read = prepared->scenario;
+  if (!prepared->closed_form.closed_form->gives_forces()) refuse("the equations give no forces");
   if (!read.motion.loads.empty()) refuse("the scenario has loads, which are functions of time");
   auto data = std::make_shared<Data>(*std::move(prepared));
   return PaperEquations(std::move(data));
