@@ -1,8 +1,10 @@
 #include "verify/drive_by.h"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 
 #include "base/demand.h"
@@ -142,6 +144,10 @@ std::string SimulationLine(const Prepared& prepared) {
     line += fmt::format("; forces extrapolated in {} from {:g} and {:g} to {:g}",
                         extrapolation.parameter, extrapolation.from[0], extrapolation.from[1],
                         prepared.mechanisms.simulated.ParameterValue(extrapolation.parameter));
+  }
+  if (prepared.has_closed_form() && !scenario.analytic.equations.empty()) {
+    line += fmt::format("; analytic: the equations of {}",
+                        std::filesystem::path(scenario.analytic.equations).filename().string());
   }
   return line;
 }

@@ -91,6 +91,7 @@ TEST_F(OwnEquations, DriveTheSimulationAndEnterTheVerdict) {
   const Comparison& comparison = outcome.report->comparison;
   EXPECT_EQ(comparison.verdict, Verdict::kAgree) << comparison.reason;
   EXPECT_EQ(outcome.report->driven_by, "analytic");
+  EXPECT_NE(outcome.report->simulation.find("the equations of crank.py"), std::string::npos);
   const PairComparison* pair = comparison.FindPair("reference_vs_analytic");
   ASSERT_NE(pair, nullptr);
   EXPECT_LT(pair->metrics.at(Metric::kForceNrmse).value, 1e-12);
