@@ -592,10 +592,38 @@ def jacobian(function, q):
     return _at_depth(q, call)
 
 
+_last_roots = {}  # by function and start: what is asked for again at once is known
+
+
 def solve(function, start, iterations=50):
     """x with function(*x) = 0, by Newton's method from `start` (numbers); with the derivatives of x
     by whatever the function depends on."""
-    x = [float(value(e)) for e in start]
+    start = tuple(float(value(e)) for e in start)
+    key = (function.__code__, start) if hasattr(function, "__code__") else None
+    known = _last_roots.get(key)
+    if known is None or not _is_root(function, *known):
+        known = _newton(function, start, iterations)
+        if len(_last_roots) > 100:
+            _last_roots.clear()
+        _last_roots[key] = known
+    x, J = known
+    # Each step with the same matrix gives one more coefficient of the series.
+    order = 2 * _level(function(*x))
+    for _ in range(order):
+        x = [a - b for a, b in zip(x, linear_solve(J, _flat(function(*x))))]
+    return Vec(x)
+
+
+def _is_root(function, x, J):
+    # The same function may depend on other numbers by now.
+    step = linear_solve(J, [value(e) for e in _flat(function(*x))])
+    size = max(abs(e) for e in x)
+    return all(abs(e) <= 1e-15 * size for e in step)
+
+
+def _newton(function, start, iterations):
+    """The root, and the derivatives of the function by its arguments there: numbers."""
+    x = list(start)
     size, largest = 1e-300, math.inf
     for _ in range(iterations):
         residual = [value(e) for e in _flat(function(*x))]
@@ -611,18 +639,8 @@ def solve(function, start, iterations=50):
             break
         size = max([size] + [abs(e) for e in x])
         if largest <= 1e-14 * size:  # the next step is round-off
-            break
-    else:
-        largest = math.inf
-    if not math.isfinite(largest) or any(not math.isfinite(e) for e in x):
-        raise Unreachable(f"solve: no root after {iterations} steps from {list(value(start))}")
-    # Each step with the same matrix gives one more coefficient of the series.
-    order = 2 * _level(function(*x))
-    if order:
-        J = value(jacobian(function, x))
-    for _ in range(order):
-        x = [a - b for a, b in zip(x, linear_solve(J, _flat(function(*x))))]
-    return Vec(x)
+            return x, value(jacobian(function, x))
+    raise Unreachable(f"solve: no root after {iterations} steps from {list(start)}")
 
 
 # What a file declares.

@@ -97,6 +97,16 @@ class Derivatives(unittest.TestCase):
             self.assertAlmostEqual(s.b, first, delta=1e-10)
             self.assertAlmostEqual(2 * s.c, second, delta=1e-7)
 
+    def test_a_root_is_not_kept_for_other_numbers(self):
+        # The same function and start, a slightly different root.
+        def root(a):
+            return eq.solve(lambda x: [x * x - a], [1.0])[0]
+
+        for a in (2.0, 2.0, 2.0 + 1e-13, 2.0 + 1e-12, 3.0, 2.0):
+            self.assertAlmostEqual(root(a), math.sqrt(a), delta=5e-16)
+        s = root(eq.Series(2.0, 1.0, 0.0))
+        self.assertAlmostEqual(s.b, 0.5 / math.sqrt(2), delta=1e-15)
+
     def test_of_a_turning_frame(self):
         def R(a, b):
             return eq.rot_z(a) @ eq.rot_x(b)

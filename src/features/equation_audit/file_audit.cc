@@ -335,8 +335,8 @@ class FileAudit {
     }
     for (const double value : quantity->At(states_.front()).values) {
       if (std::isfinite(value)) continue;
-      Error(equation.line,
-            fmt::format("{}: '{}' has no such element", equation.number, QuotedValue(text)));
+      Error(equation.line, fmt::format("{}: '{}' has no such element, or no value there",
+                                       equation.number, QuotedValue(text)));
       return {};
     }
     return quantity;

@@ -8,6 +8,7 @@
 #include "base/diagnostics.h"
 #include "base/text.h"
 #include "kinematics/constraints.h"
+#include "reference/frame_stiffness.h"
 
 namespace mbv {
 class QuantityParser {
@@ -26,7 +27,8 @@ class QuantityParser {
         !TakeElement(&text)) {
       return {};
     }
-    if (Whole(text) || OfCoordinate(text) || OfDrive(text) || OfJoint(text) || OfBody(text)) {
+    if (Whole(text) || OfCoordinate(text) || OfDrive(text) || OfStiffness(text) || OfJoint(text) ||
+        OfBody(text)) {
       return q_;
     }
     *reason_ = fmt::format("{} has no quantity '{}'", mechanism_.name, text_);
@@ -134,6 +136,16 @@ class QuantityParser {
     return false;
   }
 
+  bool OfStiffness(const std::string& text) {
+    for (size_t o = 0; o < mechanism_.outputs.size(); ++o) {
+      const auto rest = Behind(text, mechanism_.outputs[o].name);
+      if (!rest || (*rest != "stiffness" && *rest != "compliance")) continue;
+      q_.index_ = static_cast<int>(o);
+      return Is(*rest == "stiffness" ? Kind::kStiffness : Kind::kCompliance);
+    }
+    return false;
+  }
+
   bool OfJoint(const std::string& text) {
     for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
       const auto rest = Behind(text, mechanism_.joints[j].name);
@@ -205,6 +217,10 @@ class QuantityParser {
   [[nodiscard]] std::vector<std::string> Known() const {
     std::vector<std::string> known = NamesOf(NamedCommandCoordinates(mechanism_));
     for (const Drive& drive : mechanism_.drives) known.push_back(drive.name + ".force");
+    for (const Output& output : mechanism_.outputs) {
+      known.push_back(output.name + ".stiffness");
+      known.push_back(output.name + ".compliance");
+    }
     for (const Body& body : mechanism_.bodies) {
       for (const auto& [word, of] : kWords) {
         known.push_back(body.name + "." + word);
@@ -318,6 +334,10 @@ MatX AuditQuantity::Whole(const AuditState& state) const {
       return state.mass;
     case Kind::kBias:
       return state.bias;
+    case Kind::kStiffness:
+      return FrameStiffness(*state.mechanism, state.states.X_WB, index_).K;
+    case Kind::kCompliance:
+      return FrameStiffness(*state.mechanism, state.states.X_WB, index_).C;
     case Kind::kGravity:
       return state.gravity;
   }

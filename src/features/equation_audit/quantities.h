@@ -48,7 +48,9 @@ class AuditQuantity {
     kReactionComponent,
     kMass,
     kBias,
-    kGravity
+    kGravity,
+    kStiffness,
+    kCompliance
   };
   enum class Of {
     kPosition,

@@ -288,6 +288,29 @@ TEST(FileAudit, ConfirmsThePapers) {
   }
 }
 
+// A stiffness entry of an elastic model: K and C are each other's inverse.
+TEST(FileAudit, JudgesStiffnesses) {
+  const auto audit = [](const std::string& factor) {
+    return Audit("e.py",
+                 fmt::format("from mbverify.equations import *\n"
+                             "states('{}', coordinates=['platform.x', 'platform.y', 'platform.z', "
+                             "'platform.yaw'], samples=4)\n"
+                             "@equation('K', gives='platform.stiffness[6,6]', "
+                             "given={{'C': 'platform.compliance'}})\n"
+                             "def e(p, C):\n"
+                             "    return linear_solve(C, Vec(0, 0, 0, 0, 0, 1))[5] * {}\n",
+                             SourcePath("/models/scara_robot/elastic.yaml"), factor));
+  };
+  const Audited right = audit("1");
+  ASSERT_TRUE(right.table) << right.diagnostics.Text();
+  EXPECT_EQ(right.row().verdict, AuditVerdict::kOk) << SlipsOf(right.row());
+  EXPECT_GT(right.row().scale, 1e3);
+  EXPECT_EQ(audit("1.00001").row().verdict, AuditVerdict::kNearly);
+  // A model without beams has none.
+  const Audited rigid = One("slider.stiffness", "", "motor", "return motor");
+  EXPECT_FALSE(rigid.table);
+}
+
 // Quantities along a motion: rates are the derivatives of positions, whatever they are of.
 TEST(AuditQuantity, RatesAreDerivatives) {
   for (const char* name : {"spr_tripod", "stewart", "cabin_robot"}) {
