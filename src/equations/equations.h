@@ -138,6 +138,15 @@ class Equations {
                                                           const std::vector<std::string>& bodies,
                                                           const std::vector<std::string>& drives,
                                                           bool with_forces) = 0;
+  /// A state in which a form is asked.
+  struct FormState {
+    VecX q, v, a;
+  };
+  /// Drives' positions, or their forces, of an edited text of the file at many states, a row each.
+  [[nodiscard]] virtual EquationResult<std::vector<std::vector<double>>> SampleEdited(
+      const std::string& text, size_t form, bool forces, const std::vector<FormState>& states,
+      const std::vector<LoadSample>& loads, const std::vector<std::string>& bodies,
+      const std::vector<std::string>& drives) = 0;
   /// What an equation gives at many states, a row each.
   [[nodiscard]] virtual EquationResult<std::vector<std::vector<double>>> Evaluate(
       size_t equation, const std::vector<ArgumentRow>& rows, bool corrected) = 0;

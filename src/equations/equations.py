@@ -960,6 +960,28 @@ class _Host:
             values.append([numbers[0] for numbers in _numbers(function(self.parameters, *arguments))])
         return {"rows": values}
 
+    def try_form(self, source, form, part, rows, drives):
+        """Drives' positions or forces of an edited file at many states; errors are part of the
+        answer. The file stays as it was loaded."""
+        before = dict(_declared.__dict__), self.module
+        try:
+            self.load(source)
+            values = []
+            for row in rows:
+                answer = (self.drives if part == "drives" else self.sample)(form, **row)
+                key = "values" if part == "drives" else "forces"
+                named = answer.get("named" if part == "drives" else "named_forces")
+                given = [named[name] for name in drives] if named is not None else answer[key]
+                values.append([x[0] if isinstance(x, list) else x for x in given])
+            return {"rows": values}
+        except BaseException as error:  # an edited text may do anything
+            if isinstance(error, KeyboardInterrupt):
+                raise
+            return {"failed": f"{type(error).__name__}: {error}"}
+        finally:
+            _declared.__dict__.update(before[0])
+            self.module = before[1]
+
     def try_source(self, source, index, rows, corrected=False):
         """The same of a text that is edited inside of this equation alone; errors are part of the
         answer. The file stays as it was loaded."""

@@ -130,6 +130,24 @@ class FormulaEquations final : public Equations {
     return {std::move(sample)};
   }
 
+  EquationResult<std::vector<std::vector<double>>> SampleEdited(
+      const std::string& text, size_t form, bool forces, const std::vector<FormState>& states,
+      const std::vector<LoadSample>& loads, const std::vector<std::string>& bodies,
+      const std::vector<std::string>& drives) override {
+    FormulaEquations edited(file_, text);
+    if (auto failure = edited.SetParameters(parameters_)) return {{}, std::move(*failure)};
+    std::vector<std::vector<double>> rows;
+    for (const FormState& state : states) {
+      auto sample = edited.Sample(form, state.q, state.v, state.a, loads, bodies, drives, forces);
+      if (!sample) return {{}, std::move(sample.failure)};
+      rows.push_back(sample.value->forces);
+      if (forces) continue;
+      rows.back().clear();
+      for (const Jet& drive : sample.value->drives) rows.back().push_back(drive.value);
+    }
+    return {std::move(rows)};
+  }
+
   EquationResult<std::vector<std::vector<double>>> Evaluate(size_t index,
                                                             const std::vector<ArgumentRow>& rows,
                                                             bool corrected) override {

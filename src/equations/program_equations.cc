@@ -161,6 +161,19 @@ std::vector<T> InOrder(const JsonValue& answer, const char* list, const char* ma
   return values;
 }
 
+Json LoadsJson(const std::vector<LoadSample>& loads, const std::vector<std::string>& bodies) {
+  Json list = Json::array();
+  for (const LoadSample& load : loads) {
+    list.push_back({{"name", load.load == nullptr ? "" : load.load->name},
+                    {"body", bodies.at(size_t(load.body))},
+                    {"axes", load.in_body_axes ? "body" : "world"},
+                    {"point", Array(load.p_BoQ_B)},
+                    {"force", Array(load.force)},
+                    {"moment", Array(load.moment)}});
+  }
+  return list;
+}
+
 class ProgramEquations final : public Equations {
  public:
   ProgramEquations(std::string file, EquationLanguage language)
@@ -218,18 +231,7 @@ class ProgramEquations final : public Equations {
                  {"q", Array(q)},
                  {"qd", Array(v)},
                  {"qdd", Array(a)}};
-    if (with_forces) {
-      Json list = Json::array();
-      for (const LoadSample& load : loads) {
-        list.push_back({{"name", load.load == nullptr ? "" : load.load->name},
-                        {"body", bodies.at(size_t(load.body))},
-                        {"axes", load.in_body_axes ? "body" : "world"},
-                        {"point", Array(load.p_BoQ_B)},
-                        {"force", Array(load.force)},
-                        {"moment", Array(load.moment)}});
-      }
-      call["load"] = std::move(list);
-    }
+    if (with_forces) call["load"] = LoadsJson(loads, bodies);
     return Ask<FormSample>(call, kCall_s, [&](const JsonValue& answer) {
       FormSample sample;
       sample.drives = InOrder<Jet>(answer, "values", "named", drives, "positions", &JetOf);
@@ -248,6 +250,23 @@ class ProgramEquations final : public Equations {
       }
       return sample;
     });
+  }
+
+  EquationResult<std::vector<std::vector<double>>> SampleEdited(
+      const std::string& text, size_t form, bool forces, const std::vector<FormState>& states,
+      const std::vector<LoadSample>& loads, const std::vector<std::string>& bodies,
+      const std::vector<std::string>& drives) override {
+    Json rows = Json::array();
+    for (const FormState& state : states) {
+      rows.push_back({{"q", Array(state.q)}, {"qd", Array(state.v)}, {"qdd", Array(state.a)}});
+      if (forces) rows.back()["load"] = LoadsJson(loads, bodies);
+    }
+    return AskTable({{"do", "try_form"},
+                     {"source", text},
+                     {"form", form},
+                     {"part", forces ? "forces" : "drives"},
+                     {"rows", std::move(rows)},
+                     {"drives", drives}});
   }
 
   EquationResult<std::vector<std::vector<double>>> Evaluate(size_t equation,
@@ -277,6 +296,10 @@ class ProgramEquations final : public Equations {
       list.push_back(std::move(arguments));
     }
     call["rows"] = std::move(list);
+    return AskTable(call);
+  }
+
+  EquationResult<std::vector<std::vector<double>>> AskTable(const Json& call) {
     return Ask<std::vector<std::vector<double>>>(call, kCall_s, [](const JsonValue& answer) {
       if (answer.contains("failed")) answer.Refuse(answer.at("failed"));
       std::vector<std::vector<double>> values;

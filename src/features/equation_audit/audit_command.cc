@@ -26,6 +26,7 @@ namespace {
 struct AuditArguments {
   std::string model;
   std::string page;  // an HTML file
+  std::string of;    // the model of a file of equations
   bool markdown = false, no_search = false, quiet = false;
   JsonOption json;
 };
@@ -156,7 +157,7 @@ int AuditOfFile(const AuditArguments& arguments) {
   std::optional<AuditTable> table;
   {
     ProgressLine line(!arguments.quiet);
-    FileAuditOptions options{.search = !arguments.no_search};
+    FileAuditOptions options{.search = !arguments.no_search, .model = arguments.of};
     options.progress = [&](const std::string& equation, double fraction) {
       line.Show("equation " + equation, fraction);
     };
@@ -184,6 +185,7 @@ int AuditOfFile(const AuditArguments& arguments) {
 int Audit(const AuditArguments& arguments) {
   if (IsFile(arguments.model)) return AuditOfFile(arguments);
   if (!arguments.page.empty()) return Refuse("--page is of a file of equations", "");
+  if (!arguments.of.empty()) return Refuse("--model is of a file of equations", "");
   std::vector<std::string> names;
   int exit_code = 0;
   bool found = false;
@@ -226,6 +228,8 @@ void AddAuditCommand(CLI::App* app, int* exit_code) {
                     "model name, or a file of equations (.py, .m, .yaml), which runs as you; all "
                     "shipped papers without it");
   audit->add_flag("--markdown", arguments->markdown, "print a Markdown table");
+  audit->add_option("--model", arguments->of,
+                    "of a file: the model it is audited with, instead of the one it names");
   audit->add_option("--page", arguments->page, "of a file: write what was found as an HTML page");
   audit->add_flag("--no-search", arguments->no_search,
                   "of a file: do not search what would make wrong equations right");

@@ -79,14 +79,24 @@ class FileAudit {
     EquationResult<EquationsInfo> info = equations_->Load();
     if (!info) return Refused(info.failure);
     info_ = std::move(*info.value);
-    if (info_.equations.empty()) {
-      Error(0, "lists no numbered equations to audit", "@equation(\"(1)\", gives=…)");
+    if (info_.equations.empty() && info_.forms.empty()) {
+      Error(0, "lists no numbered equations and no closed form to audit",
+            "@equation(\"(1)\", gives=…)");
       return {};
     }
+    // A closed form alone is audited in its own commands.
+    if (info_.states.model.empty() && info_.equations.empty()) {
+      info_.states.model = info_.forms.front().mechanism;
+      info_.states.coordinates = info_.forms.front().commands;
+    }
+    if (!options_.model.empty()) info_.states.model = options_.model;
     is_formula_ = !IsEquationProgram(file_);
     if (!LoadMechanism() || !FindCoordinates() || !DrawStates()) return {};
     // Of formulas, arguments are known with the parameters.
-    if (const auto again = equations_->Load()) info_ = *again.value;
+    if (const auto again = equations_->Load()) {
+      info_.forms = again.value->forms;
+      info_.equations = again.value->equations;
+    }
     AuditTable table{.mechanism = mechanism_.name,
                      .source = fmt::format("{}, at {} random states of {}", file_, states_.size(),
                                            mechanism_.file)};
@@ -98,6 +108,7 @@ class FileAudit {
       }
       if (auto row = Audit(k)) table.rows.push_back(std::move(*row));
     }
+    for (size_t k = 0; k < info_.forms.size(); ++k) AuditForm(k, &table);
     if (diagnostics_->has_errors()) return {};
     return table;
   }
@@ -127,7 +138,7 @@ class FileAudit {
       return false;
     }
     const std::string folder = fs::path(file_).parent_path().string();
-    auto model = FindModel(states.model, folder);
+    auto model = FindModel(states.model, options_.model.empty() ? folder : ".");
     // Beside its own model.yaml, the file means that one.
     if (const fs::path beside = fs::path(folder) / "model.yaml"; fs::exists(beside)) {
       const LoadResult near = LoadRobot(beside.string(), {});
@@ -135,7 +146,7 @@ class FileAudit {
     }
     if (!model) {
       Error(0, fmt::format("states: there is no model '{}'", states.model),
-            ModelHint(states.model, folder));
+            ModelHint(states.model, folder) + "; --model FILE names one");
       return false;
     }
     LoadOptions load;
@@ -150,7 +161,9 @@ class FileAudit {
     std::map<std::string, double> parameters;
     for (const Parameter& parameter : mechanism_.parameters) {
       parameters[parameter.name] = parameter.value;
-      parameter_names_.push_back(parameter.name);
+      if (parameter.name.find('.') == std::string::npos) {
+        parameter_units_[parameter.name] = parameter.unit;
+      }
     }
     if (const auto failure = equations_->SetParameters(parameters)) {
       (void)Refused(*failure);
@@ -313,6 +326,7 @@ class FileAudit {
     state.states = model->states();
     state.sample = model->sample();
     state.drive_force = model->drive_force();
+    form_states_.push_back({q, v, a});
     shares_.push_back({.gravity = gravity_force,
                        .velocity = no_acceleration - gravity_force,
                        .inertia = no_loads - no_acceleration,
@@ -658,7 +672,7 @@ class FileAudit {
     search.line = equation.line;
     search.end = equation.end;
     search.language = fs::path(file_).extension().string();
-    search.names = parameter_names_;
+    search.parameters = parameter_units_;
     if (!made.rows.empty()) {
       for (const auto& [name, argument] : made.rows.front()) {
         // The quantity itself would make anything right.
@@ -682,6 +696,135 @@ class FileAudit {
     }
   }
 
+  // A closed form whose commands are the states' coordinates: drives' positions and forces. Rates
+  // and accelerations are the derivatives of the positions.
+  void AuditForm(size_t index, AuditTable* table) {
+    const FormInfo& form = info_.forms[index];
+    if (form.mechanism != mechanism_.name) return;
+    std::vector<size_t> places;
+    for (const std::string& command : form.commands) {
+      const auto found =
+          std::ranges::find_if(info_.states.coordinates, [&](const std::string& coordinate) {
+            return coordinate == command || ShortName(coordinate) == command;
+          });
+      if (found == info_.states.coordinates.end()) return;
+      places.push_back(static_cast<size_t>(found - info_.states.coordinates.begin()));
+    }
+    if (places.size() != info_.states.coordinates.size()) return;
+    std::vector<Equations::FormState> states = form_states_;
+    for (size_t k = 0; k < states.size(); ++k) {
+      for (size_t i = 0; i < places.size(); ++i) {
+        const auto to = static_cast<Eigen::Index>(i), from = static_cast<Eigen::Index>(places[i]);
+        states[k].q[to] = form_states_[k].q[from];
+        states[k].v[to] = form_states_[k].v[from];
+        states[k].a[to] = form_states_[k].a[from];
+      }
+    }
+    const bool right = AuditPart(index, states, false, table);
+    if (form.has_forces && (form.takes_loads || loads_.empty())) {
+      (void)AuditPart(index, states, true, table, right);
+    }
+  }
+
+  // Whether it is right. `search`: for slips, where it is wrong.
+  bool AuditPart(size_t index, const std::vector<Equations::FormState>& states, bool forces,
+                 AuditTable* table, bool search = true) {
+    const std::vector<std::string> drives = NamesOf(mechanism_.drives),
+                                   bodies = NamesOf(mechanism_.bodies);
+    Case made;
+    AuditValues given;
+    const FormInfo& form = info_.forms[index];
+    AuditRow row{.equation = forces ? "drive forces" : "drive positions",
+                 .printed = fmt::format("closed form, line {}", form.line),
+                 .unit = "1"};
+    for (size_t k = 0; k < states.size(); ++k) {
+      const auto sample = equations_->Sample(index, states[k].q, states[k].v, states[k].a, loads_,
+                                             bodies, drives, forces);
+      using Kind = EquationFailure::Kind;
+      if (!sample &&
+          (sample.failure.kind == Kind::kUnreachable || sample.failure.kind == Kind::kSingular)) {
+        // The reference has a pose there.
+        row.note = "it cannot be evaluated: " + sample.failure.Text();
+      } else if (!sample) {
+        (void)Refused(sample.failure);
+        return false;
+      }
+      std::vector<double> truth, values;
+      if (sample) values = sample.value->forces;
+      if (!sample) values.assign(drives.size(), kNan);
+      if (sample && !forces) values.clear();
+      for (size_t d = 0; d < drives.size(); ++d) {
+        if (sample && !forces) values.push_back(sample.value->drives[d].value);
+        const AuditState& state = states_[k];
+        truth.push_back(
+            forces ? state.drive_force[static_cast<Eigen::Index>(d)]
+                   : AuditQuantity::OfCoordinate({Coordinate::Kind::kDrive, static_cast<int>(d), 0})
+                         .At(state)
+                         .values.front());
+      }
+      given.push_back(std::move(values));
+      made.truth.push_back(std::move(truth));
+      if (forces) {
+        AddShare("the share of the weight", shares_[k].gravity, &made);
+        AddShare("the share of the velocities (Coriolis and centrifugal)", shares_[k].velocity,
+                 &made);
+        AddShare("the share of the accelerations", shares_[k].inertia, &made);
+        AddDriveTerms(k, &made);
+      }
+    }
+    Judge({}, made, &given, nullptr, kNan, &row);
+    if (options_.search && search && row.verdict != AuditVerdict::kOk) {
+      SlipSearch slips{.printed = given, .truth = made.truth};
+      slips.limit = row.limit;
+      slips.terms = made.terms;
+      slips.text = text_;
+      slips.line = 1;
+      slips.end = 1 + static_cast<int>(std::ranges::count(text_, '\n'));
+      slips.language = fs::path(file_).extension().string();
+      slips.parameters = parameter_units_;
+      slips.evaluate = [&](const std::string& text, bool few) -> std::optional<AuditValues> {
+        const auto count = few ? std::min(slips.few, states.size()) : states.size();
+        auto values = equations_->SampleEdited(
+            text, index, forces,
+            {states.begin(), states.begin() + static_cast<std::ptrdiff_t>(count)}, loads_, bodies,
+            drives);
+        if (!values) return {};
+        return std::move(*values.value);
+      };
+      for (const Slip& slip : FindSlips(slips)) {
+        row.slips.push_back(slip.edited.empty() ? slip.what : slip.what + ": " + slip.edited);
+      }
+    }
+    const bool right = row.verdict == AuditVerdict::kOk;
+    table->rows.push_back(std::move(row));
+    return right;
+  }
+
+  // A parameter times the drives' rates or accelerations: a damper, a rotor.
+  void AddDriveTerms(size_t k, Case* made) {
+    for (const char* what : {"rate", "acceleration"}) {
+      std::vector<double> motion;
+      for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+        const Drive& drive = mechanism_.drives[d];
+        std::string reason, hint;
+        const auto quantity =
+            AuditQuantity::Parse(drive.name + (*what == 'r' ? ".velocity" : ".acceleration"),
+                                 mechanism_, &reason, &hint);
+        motion.push_back(quantity ? quantity->At(states_[k]).values.front() : kNan);
+      }
+      for (const Parameter& parameter : mechanism_.parameters) {
+        std::vector<double> values = motion;
+        for (double& value : values) value *= parameter.value;
+        AddTerm(fmt::format("{} times each drive's {}", parameter.name, what), std::move(values),
+                made);
+      }
+    }
+  }
+
+  static void AddShare(const std::string& name, const VecX& values, Case* made) {
+    AddTerm(name, {values.begin(), values.end()}, made);
+  }
+
   struct Shares {
     VecX gravity, velocity, inertia, loads;
   };
@@ -692,12 +835,13 @@ class FileAudit {
   std::shared_ptr<Equations> equations_;
   EquationsInfo info_;
   Mechanism mechanism_;
-  std::vector<std::string> parameter_names_;
+  std::map<std::string, std::string> parameter_units_;
   std::vector<Command> coordinates_;
   std::map<std::string, AuditQuantity> usual_;
   std::vector<LoadSample> loads_;
   std::vector<AuditState> states_, slow_;  // slow: without accelerations
   std::vector<Shares> shares_;             // of the drives' forces
+  std::vector<Equations::FormState> form_states_;
   std::string text_;
   bool is_formula_ = false;  // which names what it uses by itself
 };

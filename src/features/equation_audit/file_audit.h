@@ -12,8 +12,9 @@
 namespace mbv {
 
 struct FileAuditOptions {
-  bool search = true;  ///< for slips
-  int samples = 0;     ///< states; 0: as many as the file says
+  bool search = true;      ///< for slips
+  int samples = 0;         ///< states; 0: as many as the file says
+  std::string model = {};  ///< in the place of the file's own; "": that one
   std::function<void(const std::string& equation, double fraction)> progress = {};
 };
 

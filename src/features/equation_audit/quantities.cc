@@ -250,6 +250,13 @@ std::optional<AuditQuantity> AuditQuantity::Parse(const std::string& text,
   return QuantityParser(text, mechanism, reason, hint).Run();
 }
 
+AuditQuantity AuditQuantity::OfCoordinate(const Coordinate& coordinate) {
+  AuditQuantity quantity;
+  quantity.kind_ = Kind::kCoordinate;
+  quantity.coordinate_ = coordinate;
+  return quantity;
+}
+
 MatX AuditQuantity::OfBody(const AuditState& state) const {
   const auto b = static_cast<size_t>(index_);
   const Body& body = state.mechanism->bodies[b];

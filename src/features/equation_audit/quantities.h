@@ -31,6 +31,7 @@ class AuditQuantity {
   [[nodiscard]] static std::optional<AuditQuantity> Parse(const std::string& text,
                                                           const Mechanism& mechanism,
                                                           std::string* reason, std::string* hint);
+  [[nodiscard]] static AuditQuantity OfCoordinate(const Coordinate& coordinate);
   [[nodiscard]] Argument At(const AuditState& state) const;
   /// The equation is an identity that must vanish.
   [[nodiscard]] bool vanishes() const { return kind_ == Kind::kZero; }

@@ -418,7 +418,7 @@ class Editor {
       if (found != functions.end()) others.insert(found->second.begin(), found->second.end());
     } else {
       for (const std::string& name : Candidates(t)) {
-        if (LooksAlike(word, name)) others.insert(name);
+        if (LooksAlike(word, name) || OfOneUnit(word, name)) others.insert(name);
       }
       if (word == "x" || word == "y" || word == "z") others.insert({"x", "y", "z"});
       others.erase(word);
@@ -434,13 +434,21 @@ class Editor {
     std::set<std::string> names;
     const bool attribute = IsAttribute(t);
     const bool parameter = attribute ? t > 1 && IsWord(t - 2, "p") : !python_ && !octave_;
-    if (parameter) names.insert(s_.names.begin(), s_.names.end());
+    for (const auto& [name, unit] : s_.parameters) {
+      if (parameter) names.insert(name);
+    }
     if (!attribute) names.insert(s_.arguments.begin(), s_.arguments.end());
     for (size_t k = 0; k < tokens_.size(); ++k) {
       if (tokens_[k].kind != Kind::kName || IsAttribute(k) != attribute || IsCalled(k)) continue;
       if (!IsKeyword(Word(tokens_[k]))) names.insert(Word(tokens_[k]));
     }
     return {names.begin(), names.end()};
+  }
+
+  [[nodiscard]] bool OfOneUnit(const std::string& a, const std::string& b) const {
+    const auto of_a = s_.parameters.find(a), of_b = s_.parameters.find(b);
+    return of_a != s_.parameters.end() && of_b != s_.parameters.end() &&
+           of_a->second == of_b->second;
   }
 
   // One letter or digit is another: c3 and c4, s3 and c3, L1 and L2, v_x and v_y; or one of two

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,10 +30,11 @@ struct SlipSearch {
   int columns = 0;     ///< of a matrix; 0: numbers or a vector
   std::vector<KnownTerm> terms = {};
 
-  std::string text = {};                    ///< the whole file
-  int line = 0, end = 0;                    ///< of the equation in it, from 1
-  std::string language = {};                ///< its extension: ".py", ".m", ".yaml"
-  std::vector<std::string> names = {};      ///< of parameters, which may be exchanged
+  std::string text = {};      ///< the whole file
+  int line = 0, end = 0;      ///< of the equation in it, from 1
+  std::string language = {};  ///< its extension: ".py", ".m", ".yaml"
+  /// Parameters with their units: those of one unit may be exchanged.
+  std::map<std::string, std::string> parameters = {};
   std::vector<std::string> arguments = {};  ///< that are known of the state
   /// What an edited file gives; at a few states first (`few`), else at all. Empty where it fails.
   std::function<std::optional<AuditValues>(const std::string& text, bool few)> evaluate = {};

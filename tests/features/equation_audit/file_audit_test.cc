@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "base/files.h"
 #include "features/equation_audit/quantities.h"
 #include "features/equation_audit/slips.h"
 #include "model_file/load_model.h"
@@ -228,7 +229,7 @@ TEST(FileAudit, RefusesWhatItCannotUnderstand) {
   };
   const std::string good = "@equation('(1)', gives='motor')\ndef e(p, motor): return motor\n";
   for (const Wrong& wrong : {
-           Wrong{Head(), "lists no numbered equations"},
+           Wrong{Head(), "lists no numbered equations and no closed form"},
            {"from mbverify.equations import *\n" + good, "does not say at which states"},
            {Head() + "@equation('(1)', gives='motr')\ndef e(p, motor): return motor\n",
             "has no quantity 'motr'"},
@@ -259,6 +260,67 @@ TEST(FileAudit, RefusesWhatItCannotUnderstand) {
         << wrong.message << "\n"
         << audited.diagnostics.Text();
   }
+}
+
+// A closed form needs no list of equations: its positions and forces are audited, slips in what
+// they call are named, too.
+TEST(FileAudit, AuditsClosedForms) {
+  const std::string text = ReadWholeFile(SourcePath("/examples/equations/delta.py")).value();
+  const auto audit = [&](const std::string& what, const std::string& with) {
+    std::string edited = text;
+    const size_t at = edited.find(what);
+    EXPECT_NE(at, std::string::npos) << what;
+    edited.replace(at, what.size(), with);
+    const test::TestFolder folder("file_audit");
+    Audited audited;
+    audited.table = AuditFile(
+        folder.Write("delta.py", edited),
+        {.samples = 6, .model = SourcePath("/examples/equations/models/delta/model.yaml")},
+        &audited.diagnostics);
+    EXPECT_TRUE(audited.table) << audited.diagnostics.Text();
+    return audited;
+  };
+  const Audited right = audit("pi / 3", "pi / 3");
+  ASSERT_EQ(right.table->rows.size(), 2u);
+  for (const AuditRow& row : right.table->rows) {
+    EXPECT_EQ(row.verdict, AuditVerdict::kOk) << SlipsOf(row);
+  }
+  struct Planted {
+    const char *what, *with;
+    size_t row;
+    const char* named;
+  };
+  for (const Planted& planted :
+       {Planted{"p.l**2) /", "p.L**2) /", 0, "'l' for 'L'"},
+        {"- p.l**2", "+ p.l**2", 0, "'-' for '+'"},
+        {"atan2(-d[2], d[0])", "atan2(d[2], d[0])", 0, "other sign"},
+        {"(elbow + wrist) / 2", "(elbow + wrist)", 1, "times 1/2"},
+        {"p.c_arm * arm", "p.L * arm", 1, "'c_arm' for 'L'"},
+        {" + p.I_arm * turning", "", 1, "plus I_arm times each drive's acceleration"},
+        {"along.T", "along", 1, "'along' transposed"}}) {
+    const Audited audited = audit(planted.what, planted.with);
+    const AuditRow& row = audited.row(planted.row);
+    EXPECT_EQ(row.verdict, AuditVerdict::kWrongAsGiven) << planted.what;
+    EXPECT_TRUE(Names(row, planted.named)) << planted.what << "\n" << SlipsOf(row);
+  }
+}
+
+// Formulas are audited alike.
+TEST(FileAudit, AuditsClosedFormsOfFormulas) {
+  std::string text =
+      ReadWholeFile(SourcePath("/examples/equations/planar_slider_crank.formulas.yaml")).value();
+  const FileAuditOptions options{
+      .samples = 6,
+      .model = SourcePath("/examples/closed_form/models/planar_slider_crank/model.yaml")};
+  const test::TestFolder folder("file_audit");
+  Diagnostics diagnostics;
+  auto table = AuditFile(folder.Write("crank.yaml", text), options, &diagnostics);
+  ASSERT_TRUE(table) << diagnostics.Text();
+  EXPECT_EQ(table->rows.at(1).verdict, AuditVerdict::kOk) << SlipsOf(table->rows.at(1));
+  text.replace(text.find("l/2*sin(phi)"), 12, "l/2*cos(phi)");
+  table = AuditFile(folder.Write("crank.yaml", text), options, &diagnostics);
+  ASSERT_TRUE(table) << diagnostics.Text();
+  EXPECT_TRUE(Names(table->rows.at(1), "'sin' for 'cos'")) << SlipsOf(table->rows.at(1));
 }
 
 // The four papers' equations as files say what the built-in audits say: what is wrong as printed
