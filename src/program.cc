@@ -16,7 +16,7 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddConvergeCommand,
     AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
     AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
-    AddMergeCommand, AddHistoryCommand, AddLogCommand;
+    AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand;
 
 namespace {
 
@@ -46,6 +46,7 @@ constexpr std::array kCommands = {
     CommandRow{AddInertiaCommand, kRobots, true},
     CommandRow{AddSizeCommand, kRobots},
     CommandRow{AddLogCommand, kRobots, true},
+    CommandRow{AddStandinCommand, kRobots, true},
     CommandRow{AddCrosscheckCommand, kEngines},
     CommandRow{AddRenderCommand, kPublish, true},
     CommandRow{AddFiguresCommand, kPublish},

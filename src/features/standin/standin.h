@@ -1,0 +1,130 @@
+// What a serial model costs that stands in for joints driven through loops (ankles and knees with
+// rods): maps from joints to motors, limits, reflected inertia, singularities, and by how much the
+// serial model's motor torques are wrong.
+//
+//   ṁ = J q̇,  J = ∂m/∂q;   τ_q = Jᵀ τ_m                                                     (1)
+//   full loop    τ_m = J⁻ᵀ (f_s + f_l + f_r)                                                  (2)
+//   serial model τ_s = J₀⁻ᵀ (f_s + A q̈)                                                       (3)
+//
+// q: the n chosen joints; m: their n drives; forces along q: f_s of the links that the serial model
+// has, f_l = M_l q̈ + c_l + g_l of the loop bodies and what acts at them, f_r = R q̈ + c_r of the
+// rotors, c quadratic in q̇. J₀: at home. A: the diagonal nearest to R over the grid. The difference
+// of (2) and (3) has four causes:
+//
+//   ratio     (J⁻ᵀ − J₀⁻ᵀ) (f_s + A q̈)        rotors   J⁻ᵀ (R − A) q̈                          (4)
+//   velocity  J⁻ᵀ (c_l + c_r)                  bodies   J⁻ᵀ (M_l q̈ + g_l)
+//
+// Singularities as [Gosselin, Angeles 1990]: type 2 where J is singular and the drives do not hold
+// the joints, type 1 where J⁻¹ is and the drives, at a dead centre, do not move them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "features/standin/transmission.h"
+
+namespace mbv {
+
+/// [rad or m] of a chosen joint.
+struct StandinRange {
+  std::string joint;
+  double low = kNan, high = kNan;
+};
+
+struct StandinSettings {
+  std::vector<StandinRange> ranges;  ///< others: the joint's limits, else home ± 30°
+  int resolution = 0;                ///< poses along each joint; 0: by the number of joints
+  double amplitude = 0.5;            ///< of the motion, by half the range
+  double frequency_hz = 1.0;
+  std::uint64_t seed = 1;
+};
+
+enum class PoseStatus {
+  kUsable,
+  kOpen,       ///< the loops cannot be closed, or a matrix is singular
+  kDriveRange, ///< a drive is beyond its range
+  kBeyond      ///< type 2: det J has another sign than at home
+};
+[[nodiscard]] const char* WordOf(PoseStatus status);
+
+/// Causes in this order, then all together.
+inline constexpr size_t kCauses = 4, kWhole = 4;
+inline constexpr std::array<const char*, kCauses + 1> kCauseNames = {
+    "constant ratio", "rotors", "velocity", "loop bodies", "all"};
+
+/// One state. Per drive [N or N m].
+struct StandinState {
+  VecX full;                              ///< (2), from the reference's balance of all bodies
+  VecX serial;                            ///< (3)
+  std::array<VecX, kCauses + 1> errors;   ///< (4); [kWhole]: full − serial, not their sum
+  double sum_off = kNan;  ///< |sum of the causes − whole| by the largest term
+};
+
+struct StandinPose {
+  VecX q;
+  PoseStatus status = PoseStatus::kOpen;
+  std::string where;              ///< drive or joint that ends the range
+  VecX drives;                    ///< m [m or rad]
+  MatX J, M, R;                   ///< of (1); n × n inertia of all, part of the rotors
+  double least = kNan;            ///< singular values of J, scaled as `unit` says
+  double largest = kNan;
+  double map_error = kNan;        ///< |J⁻ᵀ J₀ᵀ − 1|, spectral, forces in one unit
+  VecX torque_alone, speed_alone; ///< per joint, the others without torque or speed; NaN: no limits
+  double torque_any = kNan, speed_any = kNan;  ///< in every direction; NaN: units differ
+  StandinState rest, moving;      ///< at rest; with a velocity and acceleration drawn
+};
+
+/// Median, 95th percentile (nearest rank) and worst of magnitudes.
+struct Spread {
+  double median = kNan, p95 = kNan, worst = kNan;
+  size_t at = 0;  ///< index of the worst
+};
+[[nodiscard]] Spread SpreadOf(const std::vector<double>& magnitudes);
+
+/// Errors over some states.
+struct StandinScene {
+  std::string name, text;
+  size_t states = 0, left_out = 0;
+  std::vector<double> full_rms = {};                      ///< per drive
+  std::vector<std::array<Spread, kCauses + 1>> errors = {};     ///< per drive
+  std::vector<std::array<double, kCauses + 1>> errors_rms = {}; ///< per drive
+  std::vector<VecX> worst_at = {};                        ///< per drive: q of the worst `all`
+  double sum_off = 0.0;                                        ///< the largest
+};
+
+struct StandinResult {
+  std::vector<std::string> joints, drives, held, loop_bodies, notes;
+  std::vector<std::string> joint_units, drive_units;  ///< "rad" or "m"
+  std::vector<StandinRange> ranges;
+  std::vector<std::string> range_of;  ///< per joint: where the range is from
+  int resolution = 0;
+  double amplitude = 0.0, frequency_hz = 0.0;
+  VecX home;
+  MatX J_home;
+  std::string unit;   ///< of the singular values
+  double least_home = kNan, largest_home = kNan;  ///< singular values of J_home, scaled
+  std::vector<StandinPose> poses;  ///< the last joint runs fastest
+  VecX armature;      ///< A [kg m² or kg] per joint
+  Spread inertia_off; ///< |R_ii − A_i| / A_i, all joints
+  Spread coupling;    ///< |R_ij| / √(R_ii R_jj)
+  Spread map_error;   ///< at usable poses; `at`: index in `poses`
+  size_t worst_torque = 0, worst_speed = 0;  ///< poses of the least torque_any, speed_any
+  VecX drive_forces, drive_speeds;  ///< limits by the motors, per drive; infinite: none
+  bool torque_limits = false, speed_limits = false;  ///< of all drives
+  std::vector<StandinScene> scenes;
+  Diagnostics diagnostics;  ///< errors: nothing was computed
+
+  [[nodiscard]] size_t CountOf(PoseStatus status) const;
+  [[nodiscard]] size_t usable() const { return CountOf(PoseStatus::kUsable); }
+};
+
+/// `progress` gets the share that is done.
+[[nodiscard]] StandinResult ComputeStandin(const Mechanism& mechanism,
+                                           const std::vector<std::string>& joints,
+                                           const StandinSettings& settings,
+                                           const std::function<void(double)>& progress = {});
+
+}  // namespace mbv

@@ -1,0 +1,723 @@
+#include "features/standin/standin_report.h"
+
+#include <fmt/format.h>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include "base/json_text.h"
+#include "base/text.h"
+#include "plot/svg_plot.h"
+#include "report/page.h"
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kMostNames = 6;
+constexpr double kSmall = 0.01;  // of the drives' RMS: an error that is not worth a sentence
+
+Eigen::Index Ix(size_t k) { return static_cast<Eigen::Index>(k); }
+
+std::string Short(double value) {
+  return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–";
+}
+std::string Percent(double share) {
+  return std::isfinite(share) ? fmt::format("{:.3g} %", 100.0 * share) : "–";
+}
+
+double InShownUnit(double value, const std::string& unit) {
+  return unit == "rad" ? value * 180.0 / std::numbers::pi : 1000.0 * value;
+}
+const char* ShownUnit(const std::string& unit) { return unit == "rad" ? "°" : "mm"; }
+std::string ForceUnitOf(const std::string& unit) { return unit == "rad" ? "N m" : "N"; }
+
+// "pitch −20°, roll 10°".
+std::string PlaceText(const StandinResult& result, const VecX& q) {
+  std::vector<std::string> parts;
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    const std::string& unit = result.joint_units[k];
+    parts.push_back(fmt::format("{} {:.4g}{}{}", result.joints[k], InShownUnit(q[Ix(k)], unit),
+                                unit == "rad" ? "" : " ", ShownUnit(unit)));
+  }
+  return Joined(parts);
+}
+
+// The usable pose with the largest value.
+template <typename Value>
+size_t Extreme(const StandinResult& result, const Value& value) {
+  size_t at = 0;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < result.poses.size(); ++i) {
+    if (result.poses[i].status != PoseStatus::kUsable || !(value(result.poses[i]) > largest)) {
+      continue;
+    }
+    largest = value(result.poses[i]);
+    at = i;
+  }
+  return at;
+}
+size_t NearestType2(const StandinResult& result) {
+  return Extreme(result, [](const StandinPose& pose) { return -pose.least; });
+}
+size_t NearestType1(const StandinResult& result) {
+  return Extreme(result, [](const StandinPose& pose) { return pose.largest; });
+}
+
+// What ends the usable part, most poses first.
+std::vector<std::pair<std::string, size_t>> EndsOf(const StandinResult& result) {
+  std::map<std::string, size_t> counts;
+  for (const StandinPose& pose : result.poses) {
+    if (pose.status == PoseStatus::kUsable) continue;
+    const bool open = pose.status == PoseStatus::kOpen;
+    ++counts[open ? "not closed: " + pose.where
+                  : pose.status == PoseStatus::kDriveRange ? "range of drive " + pose.where
+                                                           : pose.where];
+  }
+  std::vector<std::pair<std::string, size_t>> ends(counts.begin(), counts.end());
+  std::ranges::stable_sort(ends, std::greater(), &std::pair<std::string, size_t>::second);
+  return ends;
+}
+
+double ShareOf(const StandinResult& result, size_t poses) {
+  return static_cast<double>(poses) / static_cast<double>(result.poses.size());
+}
+
+std::string ReachSentence(const StandinResult& result) {
+  std::string text = fmt::format("{} of the range can be used", Percent(ShareOf(result, result.usable())));
+  std::vector<std::string> ends;
+  for (const auto& [what, count] : EndsOf(result)) {
+    ends.push_back(fmt::format("{} ({})", what, Percent(ShareOf(result, count))));
+  }
+  return ends.empty() ? text : text + "; what ends it: " + Joined(ends, kMostNames);
+}
+
+// The drive with the largest error of a cause in a scene, by its RMS.
+struct WorstDrive {
+  size_t drive = 0;
+  double share = 0.0;  ///< of the RMS of what the full loop needs
+};
+WorstDrive WorstDriveOf(const StandinScene& scene, size_t cause) {
+  WorstDrive worst;
+  for (size_t d = 0; d < scene.full_rms.size(); ++d) {
+    const double share = scene.errors_rms[d][cause] / scene.full_rms[d];
+    if (share > worst.share) worst = {d, share};
+  }
+  return worst;
+}
+
+const char* RemedyOf(size_t cause) {
+  constexpr std::array<const char*, kCauses> kRemedies = {
+      "map torques with J(q), as standin.csv has it, instead of constant ratios",
+      "give the joints the inertia matrix R(q) of the rotors instead of a constant armature",
+      "add the velocity terms of rotors and loop bodies to the torques",
+      "give cranks and rods to the model, or their mass to the links that carry them"};
+  return kRemedies.at(cause);
+}
+
+std::string ErrorSentence(const StandinResult& result, const StandinScene& scene) {
+  const WorstDrive whole = WorstDriveOf(scene, kWhole);
+  if (!(whole.share > kSmall)) {
+    return fmt::format("{}: the serial model's motor torques are right within {} of their RMS",
+                       scene.name, Percent(std::max(whole.share, 0.0)));
+  }
+  size_t cause = 0;
+  for (size_t c = 1; c < kCauses; ++c) {
+    if (WorstDriveOf(scene, c).share > WorstDriveOf(scene, cause).share) cause = c;
+  }
+  const std::array<Spread, kCauses + 1>& errors = scene.errors[whole.drive];
+  const double rms = scene.full_rms[whole.drive];
+  return fmt::format(
+      "{}: the serial model's torque of {} is wrong by {} of its RMS ({} {}) in the median, by more "
+      "than {} in 5 % of the states; most of it is: {} ({} RMS) – {}",
+      scene.name, result.drives[whole.drive], Percent(errors[kWhole].median / rms), Short(rms),
+      ForceUnitOf(result.drive_units[whole.drive]), Percent(errors[kWhole].p95 / rms),
+      kCauseNames.at(cause), Percent(WorstDriveOf(scene, cause).share), RemedyOf(cause));
+}
+
+// Tables.
+
+Table ReachTable(const StandinResult& result) {
+  Table table{.name = "standin_reach",
+              .caption = "The range, pose by pose",
+              .columns = {Text("joint"), Digits("from"), Digits("to"), Digits("home"), Text("unit"),
+                          Text("range of")}};
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    const std::string& unit = result.joint_units[k];
+    table.rows.push_back({result.joints[k], Short(InShownUnit(result.ranges[k].low, unit)),
+                          Short(InShownUnit(result.ranges[k].high, unit)),
+                          Short(InShownUnit(result.home[Ix(k)], unit)), ShownUnit(unit),
+                          result.range_of[k]});
+  }
+  return table;
+}
+
+Table RatioTable(const StandinResult& result) {
+  Table table{.name = "standin_ratio",
+              .caption = "Neutral ratio J₀ = ∂m/∂q at home, and drives over the usable poses",
+              .columns = {Text("drive")}};
+  for (const std::string& joint : result.joints) table.columns.push_back(Digits("by " + joint));
+  for (const char* title : {"unit", "from", "to", "unit"}) {
+    table.columns.push_back(std::string(title) == "unit" ? Text(title) : Digits(title));
+  }
+  for (size_t d = 0; d < result.drives.size(); ++d) {
+    std::vector<Cell> row = {result.drives[d]};
+    for (size_t k = 0; k < result.joints.size(); ++k) {
+      row.emplace_back(fmt::format("{:.6g}", result.J_home(Ix(d), Ix(k))));
+    }
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const StandinPose& pose : result.poses) {
+      if (pose.status != PoseStatus::kUsable) continue;
+      low = std::min(low, pose.drives[Ix(d)]);
+      high = std::max(high, pose.drives[Ix(d)]);
+    }
+    const std::string& unit = result.drive_units[d];
+    row.emplace_back(unit + "/" + result.joint_units[0]);
+    row.emplace_back(Short(InShownUnit(low, unit)));
+    row.emplace_back(Short(InShownUnit(high, unit)));
+    row.emplace_back(ShownUnit(unit));
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table SpreadTable(const StandinResult& result) {
+  Table table{.name = "standin_maps",
+              .caption = "Over the usable poses",
+              .columns = {Text("what"), Digits("median"), Digits("95 %"), Digits("worst"),
+                          Wide("worst at")}};
+  const auto add = [&](const char* what, const Spread& spread, const std::string& place) {
+    table.rows.push_back({what, Percent(spread.median), Percent(spread.p95), Percent(spread.worst),
+                          place});
+  };
+  add("torque map with the neutral ratio", result.map_error,
+      PlaceText(result, result.poses[result.map_error.at].q));
+  if (std::isfinite(result.inertia_off.worst)) {
+    add("rotor inertia against the best armature", result.inertia_off, "");
+  }
+  if (std::isfinite(result.coupling.worst)) {
+    add("rotor inertia that couples joints", result.coupling, "");
+  }
+  return table;
+}
+
+Table SingularTable(const StandinResult& result) {
+  Table table{.name = "standin_singular",
+              .caption = "Distance to singularities: singular values of J [" + result.unit + "]",
+              .columns = {Text("kind"), Digits("home"), Digits("nearest"), Wide("nearest at")}};
+  const StandinPose& type2 = result.poses[NearestType2(result)];
+  const StandinPose& type1 = result.poses[NearestType1(result)];
+  table.rows.push_back({"type 2: smallest of J (0: drives do not hold)", Short(result.least_home),
+                        Short(type2.least), PlaceText(result, type2.q)});
+  table.rows.push_back({"type 1: smallest of J⁻¹ (0: dead centre)", Short(1.0 / result.largest_home),
+                        Short(1.0 / type1.largest), PlaceText(result, type1.q)});
+  return table;
+}
+
+Table LimitTable(const StandinResult& result, bool torque) {
+  Table table{.name = torque ? "standin_torque" : "standin_speed",
+              .caption = torque ? "Peak torque of the joints by the motors' limits"
+                                : "Highest rates of the joints by the motors' limits",
+              .columns = {Text("joint"), Text("unit"), Digits("least"), Digits("most"),
+                          Wide("least at")}};
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    const auto value = [&](const StandinPose& pose) {
+      return (torque ? pose.torque_alone : pose.speed_alone)[Ix(k)];
+    };
+    const size_t least = Extreme(result, [&](const StandinPose& pose) { return -value(pose); });
+    const size_t most = Extreme(result, value);
+    table.rows.push_back({result.joints[k] + " alone",
+                          torque ? ForceUnitOf(result.joint_units[k]) : result.joint_units[k] + "/s",
+                          Short(value(result.poses[least])), Short(value(result.poses[most])),
+                          PlaceText(result, result.poses[least].q)});
+  }
+  const StandinPose& worst = result.poses[torque ? result.worst_torque : result.worst_speed];
+  const double any = torque ? worst.torque_any : worst.speed_any;
+  if (result.joints.size() > 1 && std::isfinite(any)) {
+    table.rows.push_back({"every direction",
+                          torque ? ForceUnitOf(result.joint_units[0]) : result.joint_units[0] + "/s",
+                          Short(any), "", PlaceText(result, worst.q)});
+  }
+  return table;
+}
+
+Table InertiaTable(const StandinResult& result) {
+  Table table{.name = "standin_inertia",
+              .caption = "Inertia in the joints' coordinates, over the usable poses",
+              .columns = {Text("joint"), Text("unit"), Digits("all: least"), Digits("all: most"),
+                          Digits("rotors: least"), Digits("rotors: most"),
+                          Digits("best armature")}};
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    const auto of = [&](const MatX& matrix) { return matrix(Ix(k), Ix(k)); };
+    const auto all = [&](const StandinPose& pose) { return of(pose.M); };
+    const auto rotors = [&](const StandinPose& pose) { return of(pose.R); };
+    const auto less_all = [&](const StandinPose& pose) { return -of(pose.M); };
+    const auto less_rotors = [&](const StandinPose& pose) { return -of(pose.R); };
+    table.rows.push_back({result.joints[k], result.joint_units[k] == "rad" ? "kg m²" : "kg",
+                          Short(all(result.poses[Extreme(result, less_all)])),
+                          Short(all(result.poses[Extreme(result, all)])),
+                          Short(rotors(result.poses[Extreme(result, less_rotors)])),
+                          Short(rotors(result.poses[Extreme(result, rotors)])),
+                          Short(result.armature[Ix(k)])});
+  }
+  return table;
+}
+
+Table SceneTable(const StandinResult& result, const StandinScene& scene) {
+  Table table{.name = "standin_" + scene.name,
+              .caption = fmt::format("{}: {}; {} states{}", scene.name, scene.text, scene.states,
+                                     scene.left_out > 0
+                                         ? fmt::format(", {} that cannot be used are left out",
+                                                       scene.left_out)
+                                         : ""),
+              .columns = {Text("drive"), Text("cause"), Digits("median"), Digits("95 %"),
+                          Digits("worst"), Text("unit"), Digits("of the RMS: median"),
+                          Digits("95 %"), Digits("worst")}};
+  std::ranges::replace(table.name, ' ', '_');
+  for (size_t d = 0; d < result.drives.size(); ++d) {
+    const double rms = scene.full_rms[d];
+    for (size_t c = 0; c <= kWhole; ++c) {
+      const Spread& spread = scene.errors[d][c];
+      const auto share = [&](double value) {
+        return rms > 0.0 ? Percent(value / rms) : std::string("–");
+      };
+      table.rows.push_back({result.drives[d], kCauseNames.at(c), Short(spread.median),
+                            Short(spread.p95), Short(spread.worst),
+                            ForceUnitOf(result.drive_units[d]), share(spread.median),
+                            share(spread.p95), share(spread.worst)});
+    }
+  }
+  return table;
+}
+
+// Drawings.
+
+template <typename Value>
+void AddMap(const StandinResult& result, const std::string& title, const std::string& unit,
+            const Value& value, ReportSection* section) {
+  const auto shown = [&](const StandinPose& pose) {
+    return pose.status == PoseStatus::kUsable ? value(pose) : kNan;
+  };
+  const auto label = [&](size_t k) {
+    return result.joints[k] + " [" + ShownUnit(result.joint_units[k]) + "]";
+  };
+  if (result.joints.size() == 1) {
+    LinePlot plot{.title = title, .x_label = label(0), .y_label = title + " [" + unit + "]",
+                  .lines = {PlotLine{}}};
+    for (const StandinPose& pose : result.poses) {
+      plot.lines[0].points.emplace_back(InShownUnit(pose.q[0], result.joint_units[0]),
+                                        shown(pose));
+    }
+    section->Add(Drawing{ToSvg(plot)}, On::kPage);
+  }
+  if (result.joints.size() != 2 || result.resolution < 2) return;
+  // Cells around the poses: the first joint to the right.
+  MapPlot plot{.title = title,
+               .x_label = label(0),
+               .y_label = label(1),
+               .value_label = title + " [" + unit + "]",
+               .values = {}};
+  const auto edges = [&](size_t k, double* low, double* high) {
+    const StandinRange& range = result.ranges[k];
+    const double half = 0.5 * (range.high - range.low) / (result.resolution - 1);
+    *low = InShownUnit(range.low - half, result.joint_units[k]);
+    *high = InShownUnit(range.high + half, result.joint_units[k]);
+  };
+  edges(0, &plot.x_min, &plot.x_max);
+  edges(1, &plot.y_min, &plot.y_max);
+  plot.columns = plot.rows = result.resolution;
+  const auto n = static_cast<size_t>(result.resolution);
+  for (size_t row = 0; row < n; ++row) {
+    for (size_t column = 0; column < n; ++column) {
+      plot.values.push_back(shown(result.poses[column * n + row]));
+    }
+  }
+  plot.contours = 8;
+  section->Add(Drawing{ToSvg(plot)}, On::kPage);
+}
+
+// Corners of {Jᵀ τ} or {J⁻¹ ṁ} for the limits of two drives, in their order around.
+std::vector<std::array<double, 2>> Corners(const MatX& map, const VecX& most) {
+  std::vector<std::array<double, 2>> corners;
+  for (const auto& [a, b] : {std::pair(1.0, 1.0), std::pair(-1.0, 1.0), std::pair(-1.0, -1.0),
+                             std::pair(1.0, -1.0)}) {
+    const VecX corner = map.col(0) * (a * most[0]) + map.col(1) * (b * most[1]);
+    corners.push_back({corner[0], corner[1]});
+  }
+  return corners;
+}
+
+std::vector<std::array<double, 2>> CornersAt(const StandinResult& result, const StandinPose& pose,
+                                             bool torque) {
+  return torque ? Corners(pose.J.transpose(), result.drive_forces)
+                : Corners(pose.J.inverse(), result.drive_speeds);
+}
+
+void AddPolygons(const StandinResult& result, bool torque, ReportSection* section) {
+  if (result.joints.size() != 2) return;
+  const auto label = [&](size_t k) {
+    const std::string& of = result.joint_units[k];
+    return fmt::format("{} [{}]", result.joints[k], torque ? ForceUnitOf(of) : of + "/s");
+  };
+  LinePlot plot{.title = torque ? "Joint torques that the motors can give"
+                                : "Joint rates that the motors can give",
+                .x_label = label(0),
+                .y_label = label(1),
+                .equal_scale = result.joint_units[0] == result.joint_units[1],
+                .lines = {}};
+  StandinPose home;
+  home.J = result.J_home;
+  const size_t worst = torque ? result.worst_torque : result.worst_speed;
+  const size_t type2 = NearestType2(result), type1 = NearestType1(result);
+  const auto add = [&](const std::string& name, const StandinPose& pose, bool dashed) {
+    PlotLine line{.label = name, .points = {}, .closed = true, .dashed = dashed};
+    for (const auto& [x, y] : CornersAt(result, pose, torque)) line.points.emplace_back(x, y);
+    plot.lines.push_back(std::move(line));
+  };
+  add("home", home, true);
+  add("worst: " + PlaceText(result, result.poses[worst].q), result.poses[worst], false);
+  const size_t best = torque ? type1 : type2;
+  if (best != worst) add(PlaceText(result, result.poses[best].q), result.poses[best], false);
+  section->Add(Drawing{ToSvg(plot)}, On::kPage);
+}
+
+std::vector<ReportSection> SectionsOf(const StandinResult& result) {
+  std::vector<ReportSection> sections;
+  ReportSection summary{.title = "What it costs", .link = "Summary"};
+  summary.Add(Items{AdviceOf(result)});
+  summary.Add(SpreadTable(result));
+  sections.push_back(std::move(summary));
+
+  ReportSection error{.title = "Error of the serial model", .link = "Error"};
+  for (const StandinScene& scene : result.scenes) error.Add(SceneTable(result, scene));
+  error.Note(
+      "Motor torques of the serial model less those of the full loop, by cause: constant ratio, the "
+      "neutral J instead of J(q); rotors, their inertia beyond the best constant armature; velocity, "
+      "terms of rotors and loop bodies that are quadratic in the rates; loop bodies, their mass and "
+      "what else acts on them. The causes add up to the whole. Each number is of magnitudes, so that "
+      "their medians do not. RMS: of what the full loop needs of the drive over the same states.");
+  for (size_t d = 0; d < result.drives.size(); ++d) {
+    AddMap(
+        result, "error at rest: " + result.drives[d], ForceUnitOf(result.drive_units[d]),
+        [&](const StandinPose& pose) {
+          return pose.rest.full.size() == 0 ? kNan : pose.rest.errors[kWhole][Ix(d)];
+        },
+        &error);
+  }
+  sections.push_back(std::move(error));
+
+  ReportSection maps{.title = "Joints to motors", .link = "Maps"};
+  maps.Add(ReachTable(result));
+  maps.Add(RatioTable(result));
+  maps.Note(
+      "Rates: ṁ = J q̇. Torques: τ_joint = Jᵀ τ_motor. The torque map's error is the largest "
+      "singular value of J⁻ᵀ J₀ᵀ − 1: the largest error of motor torques for a joint torque, by "
+      "what the neutral ratio gives. Where drives differ in unit, lengths count in a "
+      "characteristic one.");
+  AddMap(
+      result, "torque map error", "1", [](const StandinPose& pose) { return pose.map_error; },
+      &maps);
+  for (size_t d = 0; d < result.drives.size(); ++d) {
+    const std::string& unit = result.drive_units[d];
+    AddMap(
+        result, result.drives[d], ShownUnit(unit),
+        [&](const StandinPose& pose) { return InShownUnit(pose.drives[Ix(d)], unit); }, &maps);
+  }
+  sections.push_back(std::move(maps));
+
+  if (result.torque_limits || result.speed_limits) {
+    ReportSection limits{.title = "Limits of the motors", .link = "Limits"};
+    for (const bool torque : {true, false}) {
+      if (!(torque ? result.torque_limits : result.speed_limits)) continue;
+      limits.Add(LimitTable(result, torque));
+      AddPolygons(result, torque, &limits);
+    }
+    limits.Note(
+        "Peak torque at standstill, driving, behind gear and efficiency; highest speed. Alone: the "
+        "other joints without torque or rate. Every direction: the circle inside the polygon.");
+    sections.push_back(std::move(limits));
+  }
+  ReportSection inertia{.title = "Reflected inertia", .link = "Inertia"};
+  inertia.Add(InertiaTable(result));
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    if (!(result.armature[Ix(k)] > 0.0)) continue;
+    AddMap(
+        result, "rotors about " + result.joints[k],
+        result.joint_units[k] == "rad" ? "kg m²" : "kg",
+        [&](const StandinPose& pose) { return pose.R(Ix(k), Ix(k)); }, &inertia);
+  }
+  sections.push_back(std::move(inertia));
+
+  ReportSection singular{.title = "Singularities", .link = "Singularities"};
+  singular.Add(SingularTable(result));
+  AddMap(
+      result, "smallest singular value of J", result.unit,
+      [](const StandinPose& pose) { return pose.least; }, &singular);
+  AddMap(
+      result, "smallest singular value of J⁻¹", "its inverse",
+      [](const StandinPose& pose) { return 1.0 / pose.largest; }, &singular);
+  sections.push_back(std::move(singular));
+
+  ReportSection model{.title = "The two models", .link = "Models"};
+  const auto listed = [](const std::vector<std::string>& names) {
+    return names.empty() ? std::string("none") : Joined(names);
+  };
+  Items items;
+  items.texts = {"loop bodies, which the serial model does not have: " + listed(result.loop_bodies),
+                 "degrees of freedom that stay at home: " + listed(result.held)};
+  items.texts.insert(items.texts.end(), result.notes.begin(), result.notes.end());
+  model.Add(std::move(items));
+  model.Note(
+      "The serial model is the robot with loop bodies without mass and without what acts on them, "
+      "seen along the joints: by virtual work the robot with its loops cut, driven at the joints.");
+  sections.push_back(std::move(model));
+  return sections;
+}
+
+std::string HeadLine(const StandinResult& result) {
+  return fmt::format("{} driven by {}{}: a serial model against the full loop, {} poses",
+                     Joined(result.joints), Joined(result.drives),
+                     result.loop_bodies.empty()
+                         ? ""
+                         : " through " + Joined(result.loop_bodies, kMostNames),
+                     result.poses.size());
+}
+
+Json VectorJson(const VecX& values) {
+  Json json = Json::array();
+  for (const double value : values) json.push_back(Number(value));
+  return json;
+}
+Json SpreadJson(const Spread& spread) {
+  return {{"median", Number(spread.median)},
+          {"p95", Number(spread.p95)},
+          {"worst", Number(spread.worst)}};
+}
+
+Json LimitJson(const StandinResult& result, bool torque) {
+  if (!(torque ? result.torque_limits : result.speed_limits)) return nullptr;
+  const StandinPose& worst = result.poses[torque ? result.worst_torque : result.worst_speed];
+  Json corners = Json::array();
+  if (result.joints.size() == 2) {
+    for (const auto& corner : CornersAt(result, worst, torque)) corners.push_back(corner);
+  }
+  Json alone = Json::array();
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    const auto value = [&](const StandinPose& pose) {
+      return (torque ? pose.torque_alone : pose.speed_alone)[Ix(k)];
+    };
+    const size_t least = Extreme(result, [&](const StandinPose& pose) { return -value(pose); });
+    alone.push_back({{"joint", result.joints[k]},
+                     {"least", Number(value(result.poses[least]))},
+                     {"at", VectorJson(result.poses[least].q)}});
+  }
+  return {{"alone", std::move(alone)},
+          {"any", Number(torque ? worst.torque_any : worst.speed_any)},
+          {"at", VectorJson(worst.q)},
+          {"corners", std::move(corners)}};
+}
+
+Json SceneJson(const StandinResult& result, const StandinScene& scene) {
+  Json drives = Json::array();
+  for (size_t d = 0; d < result.drives.size(); ++d) {
+    Json errors = Json::array();
+    for (size_t c = 0; c <= kWhole; ++c) {
+      Json error = {{"cause", kCauseNames.at(c)}};
+      error.update(SpreadJson(scene.errors[d][c]));
+      error["rms"] = Number(scene.errors_rms[d][c]);
+      errors.push_back(std::move(error));
+    }
+    drives.push_back({{"drive", result.drives[d]},
+                      {"unit", ForceUnitOf(result.drive_units[d])},
+                      {"full_rms", Number(scene.full_rms[d])},
+                      {"worst_at", VectorJson(scene.worst_at[d])},
+                      {"errors", std::move(errors)}});
+  }
+  return {{"name", scene.name},         {"text", scene.text},       {"states", scene.states},
+          {"left_out", scene.left_out}, {"sum_off", scene.sum_off}, {"drives", std::move(drives)}};
+}
+
+}  // namespace
+
+std::vector<std::string> AdviceOf(const StandinResult& result) {
+  std::vector<std::string> advice;
+  const Spread& map = result.map_error;
+  if (map.worst > kSmall) {
+    advice.push_back(fmt::format(
+        "With the neutral ratio motor torques are wrong by {} in the median, by more than {} in 5 % "
+        "of the range (worst {}, at {})",
+        Percent(map.median), Percent(map.p95), Percent(map.worst),
+        PlaceText(result, result.poses[map.at].q)));
+  } else {
+    advice.push_back(fmt::format(
+        "The neutral ratio is right within {} over the whole range: a constant gear does",
+        Percent(map.worst)));
+  }
+  advice.push_back(ReachSentence(result));
+  for (const StandinScene& scene : result.scenes) {
+    if (scene.states > 0) advice.push_back(ErrorSentence(result, scene));
+  }
+  if (result.inertia_off.worst > kSmall || result.coupling.worst > kSmall) {
+    advice.push_back(fmt::format(
+        "The best constant armature is off by up to {} of its own size, and joints are coupled by "
+        "up to {}, which no armature has",
+        Percent(result.inertia_off.worst),
+        Percent(std::isfinite(result.coupling.worst) ? result.coupling.worst : 0.0)));
+  }
+  return advice;
+}
+
+std::string ToText(const StandinResult& result, const TextStyle& style) {
+  std::string text = HeadLine(result) + "\n";
+  for (const ReportSection& section : SectionsOf(result)) text += ToText(section, style);
+  return text;
+}
+
+Json ToJson(const StandinResult& result, const std::string& mechanism) {
+  Json joints = Json::array(), drives = Json::array(), ends = Json::array(),
+       scenes = Json::array();
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    joints.push_back({{"name", result.joints[k]},
+                      {"unit", result.joint_units[k]},
+                      {"home", Number(result.home[Ix(k)])},
+                      {"low", Number(result.ranges[k].low)},
+                      {"high", Number(result.ranges[k].high)},
+                      {"range_of", result.range_of[k]},
+                      {"armature", Number(result.armature[Ix(k)])}});
+    drives.push_back({{"name", result.drives[k]},
+                      {"unit", result.drive_units[k]},
+                      {"ratio", VectorJson(result.J_home.row(Ix(k)).transpose())}});
+  }
+  for (const auto& [what, count] : EndsOf(result)) ends.push_back({{"what", what}, {"poses", count}});
+  for (const StandinScene& scene : result.scenes) scenes.push_back(SceneJson(result, scene));
+  const StandinPose& type2 = result.poses[NearestType2(result)];
+  const StandinPose& type1 = result.poses[NearestType1(result)];
+  Json map = SpreadJson(result.map_error);
+  map["at"] = VectorJson(result.poses[result.map_error.at].q);
+  return {{"mechanism", mechanism},
+          {"joints", std::move(joints)},
+          {"drives", std::move(drives)},
+          {"held", result.held},
+          {"loop_bodies", result.loop_bodies},
+          {"resolution", result.resolution},
+          {"reach",
+           {{"poses", result.poses.size()},
+            {"usable", result.usable()},
+            {"open", result.CountOf(PoseStatus::kOpen)},
+            {"drive_range", result.CountOf(PoseStatus::kDriveRange)},
+            {"beyond_singularity", result.CountOf(PoseStatus::kBeyond)}}},
+          {"ends", std::move(ends)},
+          {"torque_map", std::move(map)},
+          {"torque_limits", LimitJson(result, true)},
+          {"speed_limits", LimitJson(result, false)},
+          {"rotors",
+           {{"off_armature", SpreadJson(result.inertia_off)},
+            {"coupling", SpreadJson(result.coupling)}}},
+          {"singularities",
+           {{"unit", result.unit},
+            {"type2", Number(type2.least)},
+            {"type2_at", VectorJson(type2.q)},
+            {"type1", Number(1.0 / type1.largest)},
+            {"type1_at", VectorJson(type1.q)}}},
+          {"amplitude", Number(result.amplitude)},
+          {"frequency_hz", Number(result.frequency_hz)},
+          {"scenes", std::move(scenes)},
+          {"advice", AdviceOf(result)},
+          {"notes", result.notes}};
+}
+
+std::string StandinCsv(const StandinResult& result) {
+  std::vector<std::string> headings;
+  const size_t n = result.joints.size();
+  const auto per = [&](const std::vector<std::string>& names, const std::string& what,
+                       const std::function<std::string(size_t)>& unit) {
+    for (size_t k = 0; k < n; ++k) headings.push_back(names[k] + what + " [" + unit(k) + "]");
+  };
+  const auto joint_unit = [&](size_t k) { return result.joint_units[k]; };
+  const auto drive_unit = [&](size_t k) { return result.drive_units[k]; };
+  const auto inertia_unit = [&](size_t i, size_t j) {
+    const size_t lengths = (result.joint_units[i] == "m" ? 1 : 0) +
+                           (result.joint_units[j] == "m" ? 1 : 0);
+    return lengths == 0 ? "kg m²" : lengths == 1 ? "kg m" : "kg";
+  };
+  const auto force_unit = [&](size_t k) { return ForceUnitOf(result.drive_units[k]); };
+  per(result.joints, "", joint_unit);
+  headings.emplace_back("status");
+  headings.emplace_back("where");
+  per(result.drives, "", drive_unit);
+  for (size_t d = 0; d < n; ++d) {
+    for (size_t k = 0; k < n; ++k) {
+      headings.push_back(fmt::format("d {} / d {} [{}/{}]", result.drives[d], result.joints[k],
+                                     drive_unit(d), joint_unit(k)));
+    }
+  }
+  headings.push_back("smallest singular value [" + result.unit + "]");
+  headings.push_back("largest singular value [" + result.unit + "]");
+  headings.emplace_back("torque map error [1]");
+  for (const char* of : {"inertia", "rotors"}) {
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t j = 0; j <= i; ++j) {
+        headings.push_back(fmt::format("{} {} {} [{}]", of, result.joints[i], result.joints[j],
+                                       inertia_unit(i, j)));
+      }
+    }
+  }
+  per(result.joints, " peak torque alone",
+      [&](size_t k) { return ForceUnitOf(result.joint_units[k]); });
+  per(result.joints, " highest rate alone", [&](size_t k) { return result.joint_units[k] + "/s"; });
+  per(result.drives, " at rest", force_unit);
+  for (const char* cause : kCauseNames) {
+    per(result.drives, std::string(" error at rest, ") + cause, force_unit);
+  }
+  std::string csv;
+  for (const std::string& heading : headings) csv += (csv.empty() ? "" : ",") + CsvCell(heading);
+  csv += "\n";
+  for (const StandinPose& pose : result.poses) {
+    std::string row;
+    const auto number = [&](double value) {
+      row += std::isfinite(value) ? fmt::format("{:.17g},", value) : ",";
+    };
+    const auto numbers = [&](const VecX& values) {
+      for (size_t k = 0; k < n; ++k) number(values.size() > 0 ? values[Ix(k)] : kNan);
+    };
+    numbers(pose.q);
+    row += CsvCell(WordOf(pose.status)) + "," + CsvCell(pose.where) + ",";
+    numbers(pose.drives);
+    for (size_t d = 0; d < n; ++d) {
+      numbers(pose.J.size() > 0 ? VecX(pose.J.row(Ix(d)).transpose()) : VecX());
+    }
+    number(pose.least);
+    number(pose.largest);
+    number(pose.map_error);
+    for (const MatX* matrix : {&pose.M, &pose.R}) {
+      for (size_t i = 0; i < n; ++i) {
+        for (size_t j = 0; j <= i; ++j) number(matrix->size() > 0 ? (*matrix)(Ix(i), Ix(j)) : kNan);
+      }
+    }
+    numbers(pose.torque_alone);
+    numbers(pose.speed_alone);
+    numbers(pose.rest.full);
+    for (const VecX& error : pose.rest.errors) numbers(error);
+    row.back() = '\n';
+    csv += row;
+  }
+  return csv;
+}
+
+std::string StandinPage(const StandinResult& result, const std::string& mechanism) {
+  Page page;
+  for (const ReportSection& section : SectionsOf(result)) page.Add(section);
+  return page.Write({.kicker = "mbverify standin",
+                     .title = mechanism,
+                     .lead = HeadLine(result),
+                     .judges = false,
+                     .footer = "standin.csv beside this page has every pose, standin.json the "
+                               "numbers of this page."});
+}
+
+}  // namespace mbv

@@ -1,0 +1,28 @@
+// What mbverify standin found, for terminal, page and programs.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "features/standin/standin.h"
+#include "report/document.h"
+
+namespace mbv {
+
+/// Sentences to act on, the most important first.
+[[nodiscard]] std::vector<std::string> AdviceOf(const StandinResult& result);
+
+[[nodiscard]] std::string ToText(const StandinResult& result, const TextStyle& style);
+
+/// Without `schema` and `program`.
+[[nodiscard]] nlohmann::ordered_json ToJson(const StandinResult& result,
+                                            const std::string& mechanism);
+
+/// A row per pose, in the units of the headings.
+[[nodiscard]] std::string StandinCsv(const StandinResult& result);
+
+[[nodiscard]] std::string StandinPage(const StandinResult& result, const std::string& mechanism);
+
+}  // namespace mbv
