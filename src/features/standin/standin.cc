@@ -21,6 +21,7 @@ constexpr double kHalfRange = std::numbers::pi / 6.0;  // where neither user nor
 constexpr double kMostPoses = 200000.0;
 constexpr int kSamples = 400;          // of a period
 constexpr double kRegular = 1e-9;      // 1/condition of J below which no torque map is computed
+constexpr double kMost = std::numeric_limits<double>::max();
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 size_t At(Eigen::Index k) { return static_cast<size_t>(k); }
@@ -58,11 +59,8 @@ class Parts {
     return full_.MassMatrix(T_) - without_rotors_.MassMatrix(T_);
   }
 
-  // (2), (3) and (4) at the state.
-  RunSummary Evaluate(const MatX& J_home, const VecX& armature, StandinState* state) {
-    RunSummary summary = full_.AllForces({});
-    if (!summary.ok()) return summary;
-    state->full = ChosenDrives(full_.drive_force());
+  // (2), (3) and (4) at the state; why all forces together have no answer, or "".
+  std::string Evaluate(const MatX& J_home, const VecX& armature, StandinState* state) {
     const VecX f_serial = serial_.Forces(T_, {});
     const VecX f_bare = without_rotors_.Forces(T_, {});
     const VecX rotors = full_.Forces(T_, {}) - f_bare;
@@ -75,7 +73,11 @@ class Parts {
     state->errors[1] = to_joint.solve(R * a_ - armature.cwiseProduct(a_));
     state->errors[2] = to_joint.solve(rotors - R * a_ + c_loop);
     state->errors[3] = to_joint.solve(f_bare - f_serial - c_loop);
+    const RunSummary balance = full_.AllForces({});
+    state->full = balance.ok() ? ChosenDrives(full_.drive_force())
+                               : VecX(to_joint.solve(f_bare + rotors));
     state->errors[kWhole] = state->full - state->serial;
+    if (!balance.ok()) return balance.message;
     VecX sum = -state->errors[kWhole];
     VecX size = state->full.cwiseAbs().cwiseMax(state->serial.cwiseAbs());
     for (size_t c = 0; c < kCauses; ++c) {
@@ -83,7 +85,7 @@ class Parts {
       size = size.cwiseMax(state->errors[c].cwiseAbs());
     }
     state->sum_off = size.maxCoeff() > 0.0 ? sum.cwiseAbs().maxCoeff() / size.maxCoeff() : 0.0;
-    return summary;
+    return "";
   }
 
  private:
@@ -223,9 +225,11 @@ class StandinComputer {
       if (stated != settings_.ranges.end()) {
         range = *stated;
         of = "--range";
-      } else if (!std::isfinite(range.low) || !std::isfinite(range.high)) {
-        if (result_.joint_units[At(k)] == "m") {
-          Error("'" + name + "' has no limits", "--range " + name + "_mm=-20:20");
+      } else if (const bool turns = result_.joint_units[At(k)] == "rad";
+                 !(range.high - range.low <= (turns ? 2.0 * std::numbers::pi : kMost))) {
+        if (!turns) Error("'" + name + "' has no limits", "--range " + name + "_mm=-20:20");
+        if (std::isfinite(range.high - range.low)) {
+          result_.notes.push_back("the limits of '" + name + "' are more than a turn apart");
         }
         range.low = result_.home[k] - kHalfRange;
         range.high = result_.home[k] + kHalfRange;
@@ -430,6 +434,11 @@ class StandinComputer {
     return amplitude;
   }
 
+  void Evaluate(StandinState* state) {
+    const std::string trouble = parts_->Evaluate(result_.J_home, result_.armature, state);
+    if (no_balance_.empty()) no_balance_ = trouble;
+  }
+
   void Load(StandinPose* pose, std::mt19937_64* random) {
     if (pose->status != PoseStatus::kUsable) return;
     const auto drawn = [&](const VecX& most) {
@@ -441,9 +450,8 @@ class StandinComputer {
     };
     const VecX still = VecX::Zero(n_), v = drawn(Amplitude(1)), a = drawn(Amplitude(2));
     const auto evaluate = [&](const VecX& rates, const VecX& accelerations, StandinState* state) {
-      RunSummary summary = parts_->Move(pose->q, rates, accelerations);
-      if (summary.ok()) summary = parts_->Evaluate(result_.J_home, result_.armature, state);
-      if (!summary.ok()) *state = {};
+      if (!parts_->Move(pose->q, rates, accelerations).ok()) return;
+      Evaluate(state);
     };
     evaluate(still, still, &pose->rest);
     evaluate(v, a, &pose->moving);
@@ -458,6 +466,10 @@ class StandinComputer {
     }
     AddScene("at rest", "gravity and springs at all usable poses", rest);
     AddMotion();
+    if (!no_balance_.empty()) {
+      result_.notes.push_back("torques follow from the forces along the joints alone: " +
+                              no_balance_);
+    }
     AddScene("any state",
              "each usable pose with a velocity and an acceleration drawn evenly within those of the "
              "motion",
@@ -482,10 +494,8 @@ class StandinComputer {
         a[k] = -omega * omega * swing;
       }
       StandinState& state = states[static_cast<size_t>(i)];
-      RunSummary summary = parts_->Move(q, v, a);
-      if (summary.ok() && (parts_->J().determinant() > 0.0) == sign_) {
-        summary = parts_->Evaluate(result_.J_home, result_.armature, &state);
-        if (!summary.ok()) state = {};
+      if (parts_->Move(q, v, a).ok() && (parts_->J().determinant() > 0.0) == sign_) {
+        Evaluate(&state);
       }
       scene.emplace_back(q, &state);
     }
@@ -508,21 +518,16 @@ class StandinComputer {
     scene.left_out = states.size() - known.size();
     for (Eigen::Index d = 0; d < n_; ++d) {
       std::array<std::vector<double>, kCauses + 1> errors;
-      VecX full(static_cast<Eigen::Index>(known.size()));
+      std::vector<double> full;
       for (size_t i = 0; i < known.size(); ++i) {
         const StandinState& state = *known[i].second;
-        full[static_cast<Eigen::Index>(i)] = state.full[d];
+        full.push_back(std::abs(state.full[d]));
         for (size_t c = 0; c <= kWhole; ++c) errors[c].push_back(std::abs(state.errors[c][d]));
-        scene.sum_off = std::max(scene.sum_off, state.sum_off);
+        if (!(state.sum_off <= scene.sum_off)) scene.sum_off = state.sum_off;
       }
-      scene.full_rms.push_back(Rms(full));
+      scene.full_p95.push_back(SpreadOf(full).p95);
       scene.errors.emplace_back();
-      scene.errors_rms.emplace_back();
-      for (size_t c = 0; c <= kWhole; ++c) {
-        scene.errors.back()[c] = SpreadOf(errors[c]);
-        scene.errors_rms.back()[c] = Rms(Eigen::Map<const VecX>(
-            errors[c].data(), static_cast<Eigen::Index>(errors[c].size())));
-      }
+      for (size_t c = 0; c <= kWhole; ++c) scene.errors.back()[c] = SpreadOf(errors[c]);
       scene.worst_at.push_back(known.empty() ? VecX(n_)
                                              : known[scene.errors.back()[kWhole].at].first);
     }
@@ -538,6 +543,7 @@ class StandinComputer {
   Eigen::Index n_ = 0;
   UnitScale scale_;
   bool joints_differ_ = false, sign_ = true;
+  std::string no_balance_;  ///< of the first state without all forces
   std::string trouble_;  ///< of the first pose that cannot be closed
 };
 

@@ -57,10 +57,12 @@ inline constexpr std::array<const char*, kCauses + 1> kCauseNames = {
 
 /// One state. Per drive [N or N m].
 struct StandinState {
-  VecX full;                              ///< (2), from the reference's balance of all bodies
+  VecX full;                              ///< (2), by the reference's balance of all bodies
   VecX serial;                            ///< (3)
   std::array<VecX, kCauses + 1> errors;   ///< (4); [kWhole]: full − serial, not their sum
-  double sum_off = kNan;  ///< |sum of the causes − whole| by the largest term
+  /// |sum of the causes − whole| by the largest term; NaN: the balance of all bodies has no
+  /// answer, `full` is by (2).
+  double sum_off = kNan;
 };
 
 struct StandinPose {
@@ -88,11 +90,11 @@ struct Spread {
 struct StandinScene {
   std::string name, text;
   size_t states = 0, left_out = 0;
-  std::vector<double> full_rms = {};                      ///< per drive
-  std::vector<std::array<Spread, kCauses + 1>> errors = {};     ///< per drive
-  std::vector<std::array<double, kCauses + 1>> errors_rms = {}; ///< per drive
+  /// Per drive: 95th percentile of what the full loop needs, which errors are related to.
+  std::vector<double> full_p95 = {};
+  std::vector<std::array<Spread, kCauses + 1>> errors = {};  ///< per drive
   std::vector<VecX> worst_at = {};                        ///< per drive: q of the worst `all`
-  double sum_off = 0.0;                                        ///< the largest
+  double sum_off = 0.0;  ///< the largest; NaN: a state has none
 };
 
 struct StandinResult {

@@ -20,7 +20,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr size_t kMostNames = 6;
-constexpr double kSmall = 0.01;  // of the drives' RMS: an error that is not worth a sentence
+constexpr double kSmall = 0.01;  // of what a drive needs: an error that is not worth a sentence
 
 Eigen::Index Ix(size_t k) { return static_cast<Eigen::Index>(k); }
 
@@ -28,7 +28,9 @@ std::string Short(double value) {
   return std::isfinite(value) ? fmt::format("{:.4g}", value) : "–";
 }
 std::string Percent(double share) {
-  return std::isfinite(share) ? fmt::format("{:.3g} %", 100.0 * share) : "–";
+  if (!std::isfinite(share)) return "–";
+  return share < 10.0 ? fmt::format("{:.3g} %", 100.0 * share)
+                      : fmt::format("{:.0f} %", 100.0 * share);
 }
 
 double InShownUnit(double value, const std::string& unit) {
@@ -97,15 +99,15 @@ std::string ReachSentence(const StandinResult& result) {
   return ends.empty() ? text : text + "; what ends it: " + Joined(ends, kMostNames);
 }
 
-// The drive with the largest error of a cause in a scene, by its RMS.
+// The drive with the largest error of a cause in a scene, by its 95th percentile.
 struct WorstDrive {
   size_t drive = 0;
-  double share = 0.0;  ///< of the RMS of what the full loop needs
+  double share = 0.0;  ///< of StandinScene::full_p95
 };
 WorstDrive WorstDriveOf(const StandinScene& scene, size_t cause) {
   WorstDrive worst;
-  for (size_t d = 0; d < scene.full_rms.size(); ++d) {
-    const double share = scene.errors_rms[d][cause] / scene.full_rms[d];
+  for (size_t d = 0; d < scene.full_p95.size(); ++d) {
+    const double share = scene.errors[d][cause].p95 / scene.full_p95[d];
     if (share > worst.share) worst = {d, share};
   }
   return worst;
@@ -123,20 +125,20 @@ const char* RemedyOf(size_t cause) {
 std::string ErrorSentence(const StandinResult& result, const StandinScene& scene) {
   const WorstDrive whole = WorstDriveOf(scene, kWhole);
   if (!(whole.share > kSmall)) {
-    return fmt::format("{}: the serial model's motor torques are right within {} of their RMS",
-                       scene.name, Percent(std::max(whole.share, 0.0)));
+    return fmt::format("{}: the serial model's motor torques are right within {} of what is needed",
+                       scene.name, Percent(whole.share));
   }
   size_t cause = 0;
   for (size_t c = 1; c < kCauses; ++c) {
     if (WorstDriveOf(scene, c).share > WorstDriveOf(scene, cause).share) cause = c;
   }
-  const std::array<Spread, kCauses + 1>& errors = scene.errors[whole.drive];
-  const double rms = scene.full_rms[whole.drive];
+  const Spread& error = scene.errors[whole.drive][kWhole];
+  const double needed = scene.full_p95[whole.drive];
   return fmt::format(
-      "{}: the serial model's torque of {} is wrong by {} of its RMS ({} {}) in the median, by more "
-      "than {} in 5 % of the states; most of it is: {} ({} RMS) – {}",
-      scene.name, result.drives[whole.drive], Percent(errors[kWhole].median / rms), Short(rms),
-      ForceUnitOf(result.drive_units[whole.drive]), Percent(errors[kWhole].p95 / rms),
+      "{}: the serial model's torque of {} is wrong by {} of the {} {} that it needs in the median, "
+      "by more than {} in 5 % of the states; most of it by {} ({}): {}",
+      scene.name, result.drives[whole.drive], Percent(error.median / needed), Short(needed),
+      ForceUnitOf(result.drive_units[whole.drive]), Percent(error.p95 / needed),
       kCauseNames.at(cause), Percent(WorstDriveOf(scene, cause).share), RemedyOf(cause));
 }
 
@@ -276,15 +278,15 @@ Table SceneTable(const StandinResult& result, const StandinScene& scene) {
                                                        scene.left_out)
                                          : ""),
               .columns = {Text("drive"), Text("cause"), Digits("median"), Digits("95 %"),
-                          Digits("worst"), Text("unit"), Digits("of the RMS: median"),
+                          Digits("worst"), Text("unit"), Digits("of needed: median"),
                           Digits("95 %"), Digits("worst")}};
   std::ranges::replace(table.name, ' ', '_');
   for (size_t d = 0; d < result.drives.size(); ++d) {
-    const double rms = scene.full_rms[d];
+    const double needed = scene.full_p95[d];
     for (size_t c = 0; c <= kWhole; ++c) {
       const Spread& spread = scene.errors[d][c];
       const auto share = [&](double value) {
-        return rms > 0.0 ? Percent(value / rms) : std::string("–");
+        return needed > 0.0 ? Percent(value / needed) : std::string("–");
       };
       table.rows.push_back({result.drives[d], kCauseNames.at(c), Short(spread.median),
                             Short(spread.p95), Short(spread.worst),
@@ -320,7 +322,7 @@ void AddMap(const StandinResult& result, const std::string& title, const std::st
   MapPlot plot{.title = title,
                .x_label = label(0),
                .y_label = label(1),
-               .value_label = title + " [" + unit + "]",
+               .value_label = "[" + unit + "]",
                .values = {}};
   const auto edges = [&](size_t k, double* low, double* high) {
     const StandinRange& range = result.ranges[k];
@@ -400,7 +402,7 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
       "neutral J instead of J(q); rotors, their inertia beyond the best constant armature; velocity, "
       "terms of rotors and loop bodies that are quadratic in the rates; loop bodies, their mass and "
       "what else acts on them. The causes add up to the whole. Each number is of magnitudes, so that "
-      "their medians do not. RMS: of what the full loop needs of the drive over the same states.");
+      "their medians do not. Needed: the 95th percentile of the drive's torque in the full loop over the same states.");
   for (size_t d = 0; d < result.drives.size(); ++d) {
     AddMap(
         result, "error at rest: " + result.drives[d], ForceUnitOf(result.drive_units[d]),
@@ -529,17 +531,16 @@ Json SceneJson(const StandinResult& result, const StandinScene& scene) {
     for (size_t c = 0; c <= kWhole; ++c) {
       Json error = {{"cause", kCauseNames.at(c)}};
       error.update(SpreadJson(scene.errors[d][c]));
-      error["rms"] = Number(scene.errors_rms[d][c]);
       errors.push_back(std::move(error));
     }
     drives.push_back({{"drive", result.drives[d]},
                       {"unit", ForceUnitOf(result.drive_units[d])},
-                      {"full_rms", Number(scene.full_rms[d])},
+                      {"full_p95", Number(scene.full_p95[d])},
                       {"worst_at", VectorJson(scene.worst_at[d])},
                       {"errors", std::move(errors)}});
   }
   return {{"name", scene.name},         {"text", scene.text},       {"states", scene.states},
-          {"left_out", scene.left_out}, {"sum_off", scene.sum_off}, {"drives", std::move(drives)}};
+          {"left_out", scene.left_out}, {"sum_off", Number(scene.sum_off)}, {"drives", std::move(drives)}};
 }
 
 }  // namespace
@@ -569,6 +570,7 @@ std::vector<std::string> AdviceOf(const StandinResult& result) {
         Percent(result.inertia_off.worst),
         Percent(std::isfinite(result.coupling.worst) ? result.coupling.worst : 0.0)));
   }
+  for (std::string& sentence : advice) sentence = Sentence(std::move(sentence));
   return advice;
 }
 

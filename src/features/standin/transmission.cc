@@ -199,21 +199,33 @@ class TransmissionFinder {
     Append(OtherDrives(), &candidates);
     const size_t others = candidates.size();
     Append(found_.joints, &candidates);
-    const size_t preferred = candidates.size();
+    // Of the others first those at the same bodies as the chosen ones.
+    std::vector<NamedCoordinate> others_by_distance[2];
     for (const NamedCoordinate& named : all_) {
-      const bool ball = IsOfBall(JointOf(named.coordinate).kind, named.coordinate.component);
-      bool driven = false;
+      const Joint& joint = JointOf(named.coordinate);
+      bool driven = false, beside = false;
       for (const Drive& drive : mechanism_.drives) {
         const auto* on = std::get_if<JointDrive>(&drive.kind);
         driven = driven || (on != nullptr && on->joint == named.coordinate.index);
       }
-      if (!ball && !driven) candidates.push_back(named);
+      for (const NamedCoordinate& chosen : found_.joints) {
+        const Joint& own = JointOf(chosen.coordinate);
+        for (const int body : {own.parent, own.child}) {
+          beside = beside || (body > 0 && (joint.parent == body || joint.child == body));
+        }
+      }
+      if (driven || IsOfBall(joint.kind, named.coordinate.component)) continue;
+      others_by_distance[beside ? 0 : 1].push_back(named);
     }
+    for (const auto& near : others_by_distance) Append(near, &candidates);
     std::vector<std::string> would_do;
-    for (const size_t k : Choose(candidates, preferred).chosen) {
-      if (k >= others) would_do.push_back(candidates[k].name);
+    for (const size_t k : Choose(candidates, candidates.size()).chosen) {
+      if (k >= others && would_do.size() < found_.drives.size()) {
+        would_do.push_back(candidates[k].name);
+      }
     }
-    return "a set that does: --joints " + Joined(would_do);
+    if (would_do.size() < found_.drives.size()) return "choose as many joints as drives";
+    return "a set that does: " + Joined(would_do);
   }
 
   bool FindHeld() {
