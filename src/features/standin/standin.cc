@@ -11,6 +11,7 @@
 #include <random>
 
 #include "base/text.h"
+#include "kinematics/command_rank.h"
 #include "mechanism/reach.h"
 #include "reference/reduced_model.h"
 
@@ -26,17 +27,56 @@ constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 size_t At(Eigen::Index k) { return static_cast<size_t>(k); }
 
-// Kinematics once per part: all four are at one state.
+// A part of the transmission's forces. Rods that are massless there spin without need of a
+// coordinate (mechanism/idle_spins.h): what holds such a spin in the robot is left out.
+struct Part {
+  Part(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates)
+      : Part(mechanism, coordinates, Independent(mechanism, coordinates)) {}
+  Part(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates,
+       std::vector<Eigen::Index> independent)
+      : taken(std::move(independent)), model(mechanism, Chosen(coordinates, taken)) {}
+
+  static std::vector<Eigen::Index> Independent(const Mechanism& mechanism,
+                                               const std::vector<Coordinate>& coordinates) {
+    std::vector<Coordinate> candidates;
+    for (size_t p = 0; p < mechanism.prescribed.size(); ++p) {
+      candidates.push_back({Coordinate::Kind::kPrescribed, static_cast<int>(p), 0});
+    }
+    const size_t first = candidates.size();
+    candidates.insert(candidates.end(), coordinates.begin(), coordinates.end());
+    std::vector<Eigen::Index> independent;
+    for (const size_t k : ChooseCoordinates(mechanism, candidates, candidates.size()).chosen) {
+      if (k >= first) independent.push_back(static_cast<Eigen::Index>(k - first));
+    }
+    return independent;
+  }
+  static std::vector<Coordinate> Chosen(const std::vector<Coordinate>& coordinates,
+                                        const std::vector<Eigen::Index>& taken) {
+    std::vector<Coordinate> chosen;
+    for (const Eigen::Index k : taken) chosen.push_back(coordinates[At(k)]);
+    return chosen;
+  }
+
+  // Of all coordinates.
+  RunSummary Move(const VecX& q, const VecX& v, const VecX& a) {
+    return model.Move(q(taken), v(taken), a(taken));
+  }
+
+  const std::vector<Eigen::Index> taken;
+  ReducedModel model;
+};
+
+// The parts at one state.
 class Parts {
  public:
   explicit Parts(const Transmission& transmission)
       : transmission_(transmission),
         n_(static_cast<Eigen::Index>(transmission.joints.size())),
-        full_(transmission.full, transmission.coordinates()),
-        without_rotors_(transmission.without_rotors, transmission.coordinates()),
-        serial_(transmission.serial, transmission.coordinates()),
-        loop_(transmission.loop_inertia, transmission.coordinates()),
-        home_(full_.home()) {}
+        full_part_(transmission.full, transmission.coordinates()),
+        without_rotors_part_(transmission.without_rotors, transmission.coordinates()),
+        serial_part_(transmission.serial, transmission.coordinates()),
+        loop_part_(transmission.loop_inertia, transmission.coordinates()),
+        home_(HomeOf(transmission)) {}
 
   [[nodiscard]] VecX home() const { return home_.head(n_); }
 
@@ -61,6 +101,8 @@ class Parts {
 
   // (2), (3) and (4) at the state; why all forces together have no answer, or "".
   std::string Evaluate(const MatX& J_home, const VecX& armature, StandinState* state) {
+    state->v = v_;
+    state->a = a_;
     const VecX f_serial = serial_.Forces(T_, {});
     const VecX f_bare = without_rotors_.Forces(T_, {});
     const VecX rotors = full_.Forces(T_, {}) - f_bare;
@@ -99,13 +141,14 @@ class Parts {
     at.head(n_) = q;
     rates.head(n_) = v;
     accelerations.head(n_) = a;
-    for (ReducedModel* part : {&full_, &without_rotors_, &serial_, &loop_}) {
+    for (Part* part : {&full_part_, &without_rotors_part_, &serial_part_, &loop_part_}) {
       if (RunSummary summary = part->Move(at, rates, accelerations); !summary.ok()) return summary;
     }
     MatX T;
     RunSummary summary = full_.Motions(&T);
     if (!summary.ok()) return summary;
     T_ = T.leftCols(n_);
+    v_ = v;
     a_ = a;
     const MatX rates_of_all = full_.DriveRates(T_);
     J_.resize(n_, n_);
@@ -119,13 +162,24 @@ class Parts {
     return chosen;
   }
 
+  static VecX HomeOf(const Transmission& transmission) {
+    const std::vector<Coordinate> coordinates = transmission.coordinates();
+    VecX home(static_cast<Eigen::Index>(coordinates.size()));
+    for (Eigen::Index k = 0; k < home.size(); ++k) {
+      home[k] = HomeValue(transmission.full, coordinates[At(k)]);
+    }
+    return home;
+  }
+
   const Transmission& transmission_;
   const Eigen::Index n_;
-  ReducedModel full_, without_rotors_, serial_, loop_;
+  Part full_part_, without_rotors_part_, serial_part_, loop_part_;
+  ReducedModel &full_ = full_part_.model, &without_rotors_ = without_rotors_part_.model,
+               &serial_ = serial_part_.model, &loop_ = loop_part_.model;
   const VecX home_;
   bool at_home_ = true;
   MatX T_, J_;
-  VecX a_;
+  VecX v_, a_;
 };
 
 // Singular values and errors of maps in one unit: where units differ, lengths are measured in a

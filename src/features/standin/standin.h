@@ -57,6 +57,7 @@ inline constexpr std::array<const char*, kCauses + 1> kCauseNames = {
 
 /// One state. Per drive [N or N m].
 struct StandinState {
+  VecX v, a;                              ///< rates and accelerations of the joints
   VecX full;                              ///< (2), by the reference's balance of all bodies
   VecX serial;                            ///< (3)
   std::array<VecX, kCauses + 1> errors;   ///< (4); [kWhole]: full − serial, not their sum

@@ -564,11 +564,15 @@ std::vector<std::string> AdviceOf(const StandinResult& result) {
     if (scene.states > 0) advice.push_back(ErrorSentence(result, scene));
   }
   if (result.inertia_off.worst > kSmall || result.coupling.worst > kSmall) {
-    advice.push_back(fmt::format(
-        "The best constant armature is off by up to {} of its own size, and joints are coupled by "
-        "up to {}, which no armature has",
-        Percent(result.inertia_off.worst),
-        Percent(std::isfinite(result.coupling.worst) ? result.coupling.worst : 0.0)));
+    std::string text = fmt::format(
+        "The best constant armature is off by {} of its own size in the median, by more than {} in "
+        "5 % of the range",
+        Percent(result.inertia_off.median), Percent(result.inertia_off.p95));
+    if (result.coupling.worst > kSmall) {
+      text += fmt::format("; rotors couple the joints by {} in the median, which no armature does",
+                          Percent(result.coupling.median));
+    }
+    advice.push_back(std::move(text));
   }
   for (std::string& sentence : advice) sentence = Sentence(std::move(sentence));
   return advice;
@@ -674,7 +678,7 @@ std::string StandinCsv(const StandinResult& result) {
   per(result.joints, " highest rate alone", [&](size_t k) { return result.joint_units[k] + "/s"; });
   per(result.drives, " at rest", force_unit);
   for (const char* cause : kCauseNames) {
-    per(result.drives, std::string(" error at rest, ") + cause, force_unit);
+    per(result.drives, std::string(" error at rest: ") + cause, force_unit);
   }
   std::string csv;
   for (const std::string& heading : headings) csv += (csv.empty() ? "" : ",") + CsvCell(heading);
