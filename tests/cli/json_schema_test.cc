@@ -52,6 +52,9 @@ constexpr Call kCalls[] = {
     {"survey OUT", 0},
     {"log four_bar OUT/x/four_bar/turn_inverse/traces.csv --no-pictures --out OUT/x", 0},
     {"log four_bar OUT/box.obj --no-pictures --out OUT/x", 2},
+    {"standin tests/mechanisms/parallel_ankle.yaml --joints ankle.0,ankle.1 --resolution 3 "
+     "--out OUT/x",
+     0},
     {"size slider_crank/buffer", 0},
     {"size four_bar/turn", 2},
     {"figures four_bar/turn --only drive_torques --out OUT/figures", 0},

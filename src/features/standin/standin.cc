@@ -20,8 +20,8 @@ namespace {
 
 constexpr double kHalfRange = std::numbers::pi / 6.0;  // where neither user nor joint states one
 constexpr double kMostPoses = 200000.0;
-constexpr int kSamples = 400;          // of a period
-constexpr double kRegular = 1e-9;      // 1/condition of J below which no torque map is computed
+constexpr int kSamples = 400;      // of a period
+constexpr double kRegular = 1e-9;  // 1/condition of J below which no torque map is computed
 constexpr double kMost = std::numeric_limits<double>::max();
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
@@ -116,8 +116,8 @@ class Parts {
     state->errors[2] = to_joint.solve(rotors - R * a_ + c_loop);
     state->errors[3] = to_joint.solve(f_bare - f_serial - c_loop);
     const RunSummary balance = full_.AllForces({});
-    state->full = balance.ok() ? ChosenDrives(full_.drive_force())
-                               : VecX(to_joint.solve(f_bare + rotors));
+    state->full =
+        balance.ok() ? ChosenDrives(full_.drive_force()) : VecX(to_joint.solve(f_bare + rotors));
     state->errors[kWhole] = state->full - state->serial;
     if (!balance.ok()) return balance.message;
     VecX sum = -state->errors[kWhole];
@@ -394,8 +394,7 @@ class StandinComputer {
     const MatX back = pose->J.transpose().partialPivLu().inverse();
     const MatX map = scale_.drives.asDiagonal() * back * result_.J_home.transpose() *
                      scale_.drives.cwiseInverse().asDiagonal();
-    pose->map_error =
-        Eigen::JacobiSVD<MatX>(map - MatX::Identity(n_, n_)).singularValues()[0];
+    pose->map_error = Eigen::JacobiSVD<MatX>(map - MatX::Identity(n_, n_)).singularValues()[0];
     AddLimits(back, pose);
   }
 
@@ -524,10 +523,11 @@ class StandinComputer {
       result_.notes.push_back("torques follow from the forces along the joints alone: " +
                               no_balance_);
     }
-    AddScene("any state",
-             "each usable pose with a velocity and an acceleration drawn evenly within those of the "
-             "motion",
-             moving);
+    AddScene(
+        "any state",
+        "each usable pose with a velocity and an acceleration drawn evenly within those of the "
+        "motion",
+        moving);
   }
 
   // q_k = centre + A sin(2π f t + k π/2).
@@ -598,7 +598,7 @@ class StandinComputer {
   UnitScale scale_;
   bool joints_differ_ = false, sign_ = true;
   std::string no_balance_;  ///< of the first state without all forces
-  std::string trouble_;  ///< of the first pose that cannot be closed
+  std::string trouble_;     ///< of the first pose that cannot be closed
 };
 
 }  // namespace

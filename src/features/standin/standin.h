@@ -44,9 +44,9 @@ struct StandinSettings {
 
 enum class PoseStatus {
   kUsable,
-  kOpen,       ///< the loops cannot be closed, or a matrix is singular
-  kDriveRange, ///< a drive is beyond its range
-  kBeyond      ///< type 2: det J has another sign than at home
+  kOpen,        ///< the loops cannot be closed, or a matrix is singular
+  kDriveRange,  ///< a drive is beyond its range
+  kBeyond       ///< type 2: det J has another sign than at home
 };
 [[nodiscard]] const char* WordOf(PoseStatus status);
 
@@ -57,10 +57,10 @@ inline constexpr std::array<const char*, kCauses + 1> kCauseNames = {
 
 /// One state. Per drive [N or N m].
 struct StandinState {
-  VecX v, a;                              ///< rates and accelerations of the joints
-  VecX full;                              ///< (2), by the reference's balance of all bodies
-  VecX serial;                            ///< (3)
-  std::array<VecX, kCauses + 1> errors;   ///< (4); [kWhole]: full − serial, not their sum
+  VecX v, a;                             ///< rates and accelerations of the joints
+  VecX full;                             ///< (2), by the reference's balance of all bodies
+  VecX serial;                           ///< (3)
+  std::array<VecX, kCauses + 1> errors;  ///< (4); [kWhole]: full − serial, not their sum
   /// |sum of the causes − whole| by the largest term; NaN: the balance of all bodies has no
   /// answer, `full` is by (2).
   double sum_off = kNan;
@@ -69,15 +69,16 @@ struct StandinState {
 struct StandinPose {
   VecX q;
   PoseStatus status = PoseStatus::kOpen;
-  std::string where;              ///< drive or joint that ends the range
-  VecX drives;                    ///< m [m or rad]
-  MatX J, M, R;                   ///< of (1); n × n inertia of all, part of the rotors
-  double least = kNan;            ///< singular values of J, scaled as `unit` says
+  std::string where;    ///< drive or joint that ends the range
+  VecX drives;          ///< m [m or rad]
+  MatX J, M, R;         ///< of (1); n × n inertia of all, part of the rotors
+  double least = kNan;  ///< singular values of J, scaled as `unit` says
   double largest = kNan;
-  double map_error = kNan;        ///< |J⁻ᵀ J₀ᵀ − 1|, spectral, forces in one unit
-  VecX torque_alone, speed_alone; ///< per joint, the others without torque or speed; NaN: no limits
+  double map_error = kNan;  ///< |J⁻ᵀ J₀ᵀ − 1|, spectral, forces in one unit
+  VecX torque_alone,
+      speed_alone;  ///< per joint, the others without torque or speed; NaN: no limits
   double torque_any = kNan, speed_any = kNan;  ///< in every direction; NaN: units differ
-  StandinState rest, moving;      ///< at rest; with a velocity and acceleration drawn
+  StandinState rest, moving;                   ///< at rest; with a velocity and acceleration drawn
 };
 
 /// Median, 95th percentile (nearest rank) and worst of magnitudes.
@@ -94,8 +95,8 @@ struct StandinScene {
   /// Per drive: 95th percentile of what the full loop needs, which errors are related to.
   std::vector<double> full_p95 = {};
   std::vector<std::array<Spread, kCauses + 1>> errors = {};  ///< per drive
-  std::vector<VecX> worst_at = {};                        ///< per drive: q of the worst `all`
-  double sum_off = 0.0;  ///< the largest; NaN: a state has none
+  std::vector<VecX> worst_at = {};                           ///< per drive: q of the worst `all`
+  double sum_off = 0.0;                                      ///< the largest; NaN: a state has none
 };
 
 struct StandinResult {
@@ -107,14 +108,14 @@ struct StandinResult {
   double amplitude = 0.0, frequency_hz = 0.0;
   VecX home;
   MatX J_home;
-  std::string unit;   ///< of the singular values
+  std::string unit;                               ///< of the singular values
   double least_home = kNan, largest_home = kNan;  ///< singular values of J_home, scaled
-  std::vector<StandinPose> poses;  ///< the last joint runs fastest
-  VecX armature;      ///< A [kg m² or kg] per joint
-  Spread inertia_off; ///< |R_ii − A_i| / A_i, all joints
-  Spread coupling;    ///< |R_ij| / √(R_ii R_jj)
-  Spread map_error;   ///< at usable poses; `at`: index in `poses`
-  size_t worst_torque = 0, worst_speed = 0;  ///< poses of the least torque_any, speed_any
+  std::vector<StandinPose> poses;                 ///< the last joint runs fastest
+  VecX armature;                                  ///< A [kg m² or kg] per joint
+  Spread inertia_off;                             ///< |R_ii − A_i| / A_i, all joints
+  Spread coupling;                                ///< |R_ij| / √(R_ii R_jj)
+  Spread map_error;                               ///< at usable poses; `at`: index in `poses`
+  size_t worst_torque = 0, worst_speed = 0;       ///< poses of the least torque_any, speed_any
   VecX drive_forces, drive_speeds;  ///< limits by the motors, per drive; infinite: none
   bool torque_limits = false, speed_limits = false;  ///< of all drives
   std::vector<StandinScene> scenes;

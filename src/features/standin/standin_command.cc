@@ -129,7 +129,6 @@ void AddStandinCommand(CLI::App* app, int* exit_code) {
   standin
       ->add_option("--joints", arguments->joints,
                    "joints of the serial model, as many as drives move them: pitch,roll")
-      ->required()
       ->delimiter(',')
       ->allow_extra_args(false);
   standin
@@ -142,8 +141,7 @@ void AddStandinCommand(CLI::App* app, int* exit_code) {
                    "poses along each joint; otherwise 201, 41, 11 or 5 by the number of joints")
       ->check(CLI::Range(2, 100000));
   standin
-      ->add_option("--amplitude", arguments->settings.amplitude,
-                   "of the motion, by half the range")
+      ->add_option("--amplitude", arguments->settings.amplitude, "of the motion, by half the range")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   standin->add_option("--frequency", arguments->settings.frequency_hz, "of the motion [Hz]")

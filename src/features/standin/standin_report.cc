@@ -77,9 +77,9 @@ std::vector<std::pair<std::string, size_t>> EndsOf(const StandinResult& result) 
   for (const StandinPose& pose : result.poses) {
     if (pose.status == PoseStatus::kUsable) continue;
     const bool open = pose.status == PoseStatus::kOpen;
-    ++counts[open ? "not closed: " + pose.where
-                  : pose.status == PoseStatus::kDriveRange ? "range of drive " + pose.where
-                                                           : pose.where];
+    ++counts[open                                     ? "not closed: " + pose.where
+             : pose.status == PoseStatus::kDriveRange ? "range of drive " + pose.where
+                                                      : pose.where];
   }
   std::vector<std::pair<std::string, size_t>> ends(counts.begin(), counts.end());
   std::ranges::stable_sort(ends, std::greater(), &std::pair<std::string, size_t>::second);
@@ -91,7 +91,8 @@ double ShareOf(const StandinResult& result, size_t poses) {
 }
 
 std::string ReachSentence(const StandinResult& result) {
-  std::string text = fmt::format("{} of the range can be used", Percent(ShareOf(result, result.usable())));
+  std::string text =
+      fmt::format("{} of the range can be used", Percent(ShareOf(result, result.usable())));
   std::vector<std::string> ends;
   for (const auto& [what, count] : EndsOf(result)) {
     ends.push_back(fmt::format("{} ({})", what, Percent(ShareOf(result, count))));
@@ -135,7 +136,8 @@ std::string ErrorSentence(const StandinResult& result, const StandinScene& scene
   const Spread& error = scene.errors[whole.drive][kWhole];
   const double needed = scene.full_p95[whole.drive];
   return fmt::format(
-      "{}: the serial model's torque of {} is wrong by {} of the {} {} that it needs in the median, "
+      "{}: the serial model's torque of {} is wrong by {} of the {} {} that it needs in the "
+      "median, "
       "by more than {} in 5 % of the states; most of it by {} ({}): {}",
       scene.name, result.drives[whole.drive], Percent(error.median / needed), Short(needed),
       ForceUnitOf(result.drive_units[whole.drive]), Percent(error.p95 / needed),
@@ -194,8 +196,8 @@ Table SpreadTable(const StandinResult& result) {
               .columns = {Text("what"), Digits("median"), Digits("95 %"), Digits("worst"),
                           Wide("worst at")}};
   const auto add = [&](const char* what, const Spread& spread, const std::string& place) {
-    table.rows.push_back({what, Percent(spread.median), Percent(spread.p95), Percent(spread.worst),
-                          place});
+    table.rows.push_back(
+        {what, Percent(spread.median), Percent(spread.p95), Percent(spread.worst), place});
   };
   add("torque map with the neutral ratio", result.map_error,
       PlaceText(result, result.poses[result.map_error.at].q));
@@ -216,44 +218,47 @@ Table SingularTable(const StandinResult& result) {
   const StandinPose& type1 = result.poses[NearestType1(result)];
   table.rows.push_back({"type 2: smallest of J (0: drives do not hold)", Short(result.least_home),
                         Short(type2.least), PlaceText(result, type2.q)});
-  table.rows.push_back({"type 1: smallest of J⁻¹ (0: dead centre)", Short(1.0 / result.largest_home),
-                        Short(1.0 / type1.largest), PlaceText(result, type1.q)});
+  table.rows.push_back({"type 1: smallest of J⁻¹ (0: dead centre)",
+                        Short(1.0 / result.largest_home), Short(1.0 / type1.largest),
+                        PlaceText(result, type1.q)});
   return table;
 }
 
 Table LimitTable(const StandinResult& result, bool torque) {
-  Table table{.name = torque ? "standin_torque" : "standin_speed",
-              .caption = torque ? "Peak torque of the joints by the motors' limits"
-                                : "Highest rates of the joints by the motors' limits",
-              .columns = {Text("joint"), Text("unit"), Digits("least"), Digits("most"),
-                          Wide("least at")}};
+  Table table{
+      .name = torque ? "standin_torque" : "standin_speed",
+      .caption = torque ? "Peak torque of the joints by the motors' limits"
+                        : "Highest rates of the joints by the motors' limits",
+      .columns = {Text("joint"), Text("unit"), Digits("least"), Digits("most"), Wide("least at")}};
   for (size_t k = 0; k < result.joints.size(); ++k) {
     const auto value = [&](const StandinPose& pose) {
       return (torque ? pose.torque_alone : pose.speed_alone)[Ix(k)];
     };
     const size_t least = Extreme(result, [&](const StandinPose& pose) { return -value(pose); });
     const size_t most = Extreme(result, value);
-    table.rows.push_back({result.joints[k] + " alone",
-                          torque ? ForceUnitOf(result.joint_units[k]) : result.joint_units[k] + "/s",
-                          Short(value(result.poses[least])), Short(value(result.poses[most])),
-                          PlaceText(result, result.poses[least].q)});
+    table.rows.push_back(
+        {result.joints[k] + " alone",
+         torque ? ForceUnitOf(result.joint_units[k]) : result.joint_units[k] + "/s",
+         Short(value(result.poses[least])), Short(value(result.poses[most])),
+         PlaceText(result, result.poses[least].q)});
   }
   const StandinPose& worst = result.poses[torque ? result.worst_torque : result.worst_speed];
   const double any = torque ? worst.torque_any : worst.speed_any;
   if (result.joints.size() > 1 && std::isfinite(any)) {
-    table.rows.push_back({"every direction",
-                          torque ? ForceUnitOf(result.joint_units[0]) : result.joint_units[0] + "/s",
-                          Short(any), "", PlaceText(result, worst.q)});
+    table.rows.push_back(
+        {"every direction",
+         torque ? ForceUnitOf(result.joint_units[0]) : result.joint_units[0] + "/s", Short(any), "",
+         PlaceText(result, worst.q)});
   }
   return table;
 }
 
 Table InertiaTable(const StandinResult& result) {
-  Table table{.name = "standin_inertia",
-              .caption = "Inertia in the joints' coordinates, over the usable poses",
-              .columns = {Text("joint"), Text("unit"), Digits("all: least"), Digits("all: most"),
-                          Digits("rotors: least"), Digits("rotors: most"),
-                          Digits("best armature")}};
+  Table table{
+      .name = "standin_inertia",
+      .caption = "Inertia in the joints' coordinates, over the usable poses",
+      .columns = {Text("joint"), Text("unit"), Digits("all: least"), Digits("all: most"),
+                  Digits("rotors: least"), Digits("rotors: most"), Digits("best armature")}};
   for (size_t k = 0; k < result.joints.size(); ++k) {
     const auto of = [&](const MatX& matrix) { return matrix(Ix(k), Ix(k)); };
     const auto all = [&](const StandinPose& pose) { return of(pose.M); };
@@ -271,15 +276,14 @@ Table InertiaTable(const StandinResult& result) {
 }
 
 Table SceneTable(const StandinResult& result, const StandinScene& scene) {
-  Table table{.name = "standin_" + scene.name,
-              .caption = fmt::format("{}: {}; {} states{}", scene.name, scene.text, scene.states,
-                                     scene.left_out > 0
-                                         ? fmt::format(", {} that cannot be used are left out",
-                                                       scene.left_out)
-                                         : ""),
-              .columns = {Text("drive"), Text("cause"), Digits("median"), Digits("95 %"),
-                          Digits("worst"), Text("unit"), Digits("of needed: median"),
-                          Digits("95 %"), Digits("worst")}};
+  Table table{
+      .name = "standin_" + scene.name,
+      .caption = fmt::format(
+          "{}: {}; {} states{}", scene.name, scene.text, scene.states,
+          scene.left_out > 0 ? fmt::format(", {} that cannot be used are left out", scene.left_out)
+                             : ""),
+      .columns = {Text("drive"), Text("cause"), Digits("median"), Digits("95 %"), Digits("worst"),
+                  Text("unit"), Digits("of needed: median"), Digits("95 %"), Digits("worst")}};
   std::ranges::replace(table.name, ' ', '_');
   for (size_t d = 0; d < result.drives.size(); ++d) {
     const double needed = scene.full_p95[d];
@@ -309,11 +313,12 @@ void AddMap(const StandinResult& result, const std::string& title, const std::st
     return result.joints[k] + " [" + ShownUnit(result.joint_units[k]) + "]";
   };
   if (result.joints.size() == 1) {
-    LinePlot plot{.title = title, .x_label = label(0), .y_label = title + " [" + unit + "]",
+    LinePlot plot{.title = title,
+                  .x_label = label(0),
+                  .y_label = title + " [" + unit + "]",
                   .lines = {PlotLine{}}};
     for (const StandinPose& pose : result.poses) {
-      plot.lines[0].points.emplace_back(InShownUnit(pose.q[0], result.joint_units[0]),
-                                        shown(pose));
+      plot.lines[0].points.emplace_back(InShownUnit(pose.q[0], result.joint_units[0]), shown(pose));
     }
     section->Add(Drawing{ToSvg(plot)}, On::kPage);
   }
@@ -346,8 +351,8 @@ void AddMap(const StandinResult& result, const std::string& title, const std::st
 // Corners of {Jᵀ τ} or {J⁻¹ ṁ} for the limits of two drives, in their order around.
 std::vector<std::array<double, 2>> Corners(const MatX& map, const VecX& most) {
   std::vector<std::array<double, 2>> corners;
-  for (const auto& [a, b] : {std::pair(1.0, 1.0), std::pair(-1.0, 1.0), std::pair(-1.0, -1.0),
-                             std::pair(1.0, -1.0)}) {
+  for (const auto& [a, b] :
+       {std::pair(1.0, 1.0), std::pair(-1.0, 1.0), std::pair(-1.0, -1.0), std::pair(1.0, -1.0)}) {
     const VecX corner = map.col(0) * (a * most[0]) + map.col(1) * (b * most[1]);
     corners.push_back({corner[0], corner[1]});
   }
@@ -398,11 +403,16 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
   ReportSection error{.title = "Error of the serial model", .link = "Error"};
   for (const StandinScene& scene : result.scenes) error.Add(SceneTable(result, scene));
   error.Note(
-      "Motor torques of the serial model less those of the full loop, by cause: constant ratio, the "
-      "neutral J instead of J(q); rotors, their inertia beyond the best constant armature; velocity, "
-      "terms of rotors and loop bodies that are quadratic in the rates; loop bodies, their mass and "
-      "what else acts on them. The causes add up to the whole. Each number is of magnitudes, so that "
-      "their medians do not. Needed: the 95th percentile of the drive's torque in the full loop over the same states.");
+      "Motor torques of the serial model less those of the full loop, by cause: constant ratio, "
+      "the "
+      "neutral J instead of J(q); rotors, their inertia beyond the best constant armature; "
+      "velocity, "
+      "terms of rotors and loop bodies that are quadratic in the rates; loop bodies, their mass "
+      "and "
+      "what else acts on them. The causes add up to the whole. Each number is of magnitudes, so "
+      "that "
+      "their medians do not. Needed: the 95th percentile of the drive's torque in the full loop "
+      "over the same states.");
   for (size_t d = 0; d < result.drives.size(); ++d) {
     AddMap(
         result, "error at rest: " + result.drives[d], ForceUnitOf(result.drive_units[d]),
@@ -449,8 +459,7 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
   for (size_t k = 0; k < result.joints.size(); ++k) {
     if (!(result.armature[Ix(k)] > 0.0)) continue;
     AddMap(
-        result, "rotors about " + result.joints[k],
-        result.joint_units[k] == "rad" ? "kg m²" : "kg",
+        result, "rotors about " + result.joints[k], result.joint_units[k] == "rad" ? "kg m²" : "kg",
         [&](const StandinPose& pose) { return pose.R(Ix(k), Ix(k)); }, &inertia);
   }
   sections.push_back(std::move(inertia));
@@ -482,12 +491,11 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
 }
 
 std::string HeadLine(const StandinResult& result) {
-  return fmt::format("{} driven by {}{}: a serial model against the full loop, {} poses",
-                     Joined(result.joints), Joined(result.drives),
-                     result.loop_bodies.empty()
-                         ? ""
-                         : " through " + Joined(result.loop_bodies, kMostNames),
-                     result.poses.size());
+  return fmt::format(
+      "{} driven by {}{}: a serial model against the full loop, {} poses", Joined(result.joints),
+      Joined(result.drives),
+      result.loop_bodies.empty() ? "" : " through " + Joined(result.loop_bodies, kMostNames),
+      result.poses.size());
 }
 
 Json VectorJson(const VecX& values) {
@@ -539,8 +547,12 @@ Json SceneJson(const StandinResult& result, const StandinScene& scene) {
                       {"worst_at", VectorJson(scene.worst_at[d])},
                       {"errors", std::move(errors)}});
   }
-  return {{"name", scene.name},         {"text", scene.text},       {"states", scene.states},
-          {"left_out", scene.left_out}, {"sum_off", Number(scene.sum_off)}, {"drives", std::move(drives)}};
+  return {{"name", scene.name},
+          {"text", scene.text},
+          {"states", scene.states},
+          {"left_out", scene.left_out},
+          {"sum_off", Number(scene.sum_off)},
+          {"drives", std::move(drives)}};
 }
 
 }  // namespace
@@ -549,11 +561,12 @@ std::vector<std::string> AdviceOf(const StandinResult& result) {
   std::vector<std::string> advice;
   const Spread& map = result.map_error;
   if (map.worst > kSmall) {
-    advice.push_back(fmt::format(
-        "With the neutral ratio motor torques are wrong by {} in the median, by more than {} in 5 % "
-        "of the range (worst {}, at {})",
-        Percent(map.median), Percent(map.p95), Percent(map.worst),
-        PlaceText(result, result.poses[map.at].q)));
+    advice.push_back(
+        fmt::format("With the neutral ratio motor torques are wrong by {} in the median, by more "
+                    "than {} in 5 % "
+                    "of the range (worst {}, at {})",
+                    Percent(map.median), Percent(map.p95), Percent(map.worst),
+                    PlaceText(result, result.poses[map.at].q)));
   } else {
     advice.push_back(fmt::format(
         "The neutral ratio is right within {} over the whole range: a constant gear does",
@@ -585,8 +598,7 @@ std::string ToText(const StandinResult& result, const TextStyle& style) {
 }
 
 Json ToJson(const StandinResult& result, const std::string& mechanism) {
-  Json joints = Json::array(), drives = Json::array(), ends = Json::array(),
-       scenes = Json::array();
+  Json joints = Json::array(), drives = Json::array(), ends = Json::array(), scenes = Json::array();
   for (size_t k = 0; k < result.joints.size(); ++k) {
     joints.push_back({{"name", result.joints[k]},
                       {"unit", result.joint_units[k]},
@@ -599,7 +611,8 @@ Json ToJson(const StandinResult& result, const std::string& mechanism) {
                       {"unit", result.drive_units[k]},
                       {"ratio", VectorJson(result.J_home.row(Ix(k)).transpose())}});
   }
-  for (const auto& [what, count] : EndsOf(result)) ends.push_back({{"what", what}, {"poses", count}});
+  for (const auto& [what, count] : EndsOf(result))
+    ends.push_back({{"what", what}, {"poses", count}});
   for (const StandinScene& scene : result.scenes) scenes.push_back(SceneJson(result, scene));
   const StandinPose& type2 = result.poses[NearestType2(result)];
   const StandinPose& type1 = result.poses[NearestType1(result)];
@@ -647,8 +660,8 @@ std::string StandinCsv(const StandinResult& result) {
   const auto joint_unit = [&](size_t k) { return result.joint_units[k]; };
   const auto drive_unit = [&](size_t k) { return result.drive_units[k]; };
   const auto inertia_unit = [&](size_t i, size_t j) {
-    const size_t lengths = (result.joint_units[i] == "m" ? 1 : 0) +
-                           (result.joint_units[j] == "m" ? 1 : 0);
+    const size_t lengths =
+        (result.joint_units[i] == "m" ? 1 : 0) + (result.joint_units[j] == "m" ? 1 : 0);
     return lengths == 0 ? "kg m²" : lengths == 1 ? "kg m" : "kg";
   };
   const auto force_unit = [&](size_t k) { return ForceUnitOf(result.drive_units[k]); };

@@ -1,11 +1,11 @@
 // What mbverify standin found, for terminal, page and programs.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/json_text.h"
 #include "features/standin/standin.h"
 #include "report/document.h"
 

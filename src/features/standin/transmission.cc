@@ -14,7 +14,7 @@
 namespace mbv {
 namespace {
 
-constexpr size_t kNamed = 8;      // in a message at most
+constexpr size_t kNamed = 8;     // in a message at most
 constexpr double kMoves = 1e-9;  // smaller shares of the largest rate are rounding
 
 // Rates of a coordinate per unit of each column of T (ReducedModel::Motions()).
@@ -72,7 +72,8 @@ class TransmissionFinder {
       }
       found_.joints.push_back(*at);
     }
-    if (names_.empty()) return Error("no joints are chosen", "--joints pitch,roll");
+    if (names_.empty())
+      return Error("no joints are chosen", "--joints A,B of: " + Joined(known, kNamed));
     return true;
   }
 
@@ -80,8 +81,8 @@ class TransmissionFinder {
   [[nodiscard]] std::vector<NamedCoordinate> Fixed() const {
     std::vector<NamedCoordinate> fixed;
     for (size_t p = 0; p < mechanism_.prescribed.size(); ++p) {
-      fixed.push_back({mechanism_.prescribed[p].name,
-                       {Coordinate::Kind::kPrescribed, static_cast<int>(p), 0}});
+      fixed.push_back(
+          {mechanism_.prescribed[p].name, {Coordinate::Kind::kPrescribed, static_cast<int>(p), 0}});
     }
     return fixed;
   }
@@ -241,7 +242,8 @@ class TransmissionFinder {
       if (k >= own) found_.held.push_back(candidates[k]);
     }
     for (const size_t k : choice.chosen) {
-      if (k < fixed) found_.notes.push_back("prescribed '" + candidates[k].name + "' stays at home");
+      if (k < fixed)
+        found_.notes.push_back("prescribed '" + candidates[k].name + "' stays at home");
     }
     for (const int d : found_.drives) {
       const Drive& drive = mechanism_.drives[static_cast<size_t>(d)];
@@ -287,8 +289,8 @@ class TransmissionFinder {
       better = false;
       for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
         const int cost = chosen.contains(static_cast<int>(j)) ? 0 : 1;
-        for (const auto& [from, to] : {std::pair(edges[j][0], edges[j][1]),
-                                       std::pair(edges[j][1], edges[j][0])}) {
+        for (const auto& [from, to] :
+             {std::pair(edges[j][0], edges[j][1]), std::pair(edges[j][1], edges[j][0])}) {
           const auto f = static_cast<size_t>(from), t = static_cast<size_t>(to);
           if (distance[f] == kFar || distance[f] + cost >= distance[t]) continue;
           distance[t] = distance[f] + cost;
@@ -357,11 +359,11 @@ class TransmissionFinder {
     }
     for (const Motor& motor : full.motors) {
       if (!(motor.rotor_inertia > 0.0)) continue;
-      ForceElement rotor{.name = full.drives[static_cast<size_t>(motor.drive)].name + " rotor",
-                         .law = RotorLaw{.inertia = motor.rotor_inertia,
-                                         .ratio = motor.gear_ratio}};
-      if (const auto* on = std::get_if<JointDrive>(
-              &full.drives[static_cast<size_t>(motor.drive)].kind)) {
+      ForceElement rotor{
+          .name = full.drives[static_cast<size_t>(motor.drive)].name + " rotor",
+          .law = RotorLaw{.inertia = motor.rotor_inertia, .ratio = motor.gear_ratio}};
+      if (const auto* on =
+              std::get_if<JointDrive>(&full.drives[static_cast<size_t>(motor.drive)].kind)) {
         rotor.joint = on->joint;
         rotor.coordinate = on->coordinate;
       } else {

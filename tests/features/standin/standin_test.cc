@@ -115,9 +115,9 @@ TEST(Standin, AnkleIsAsTheRodsLengthsSay) {
               ElementsAre("left_crank", "right_crank", "left_rod", "right_rod"));
   EXPECT_TRUE(result.held.empty());
 
-  const StandinResult longer = ComputeStandin(
-      Ankle({{"frames: {end: [0, 0, -rod]}", "frames: {end: [0, 0, -rod - 1e-6]}"}}), kPitchRoll,
-      Grid(9));
+  const StandinResult longer =
+      ComputeStandin(Ankle({{"frames: {end: [0, 0, -rod]}", "frames: {end: [0, 0, -rod - 1e-6]}"}}),
+                     kPitchRoll, Grid(9));
   EXPECT_GT(LargestOff(longer, false), 1e-5);
   EXPECT_GT(LargestOff(longer, true), 1e-6);
 }
@@ -179,13 +179,14 @@ TEST(Standin, CausesAddUpToTheBalanceOfAllBodies) {
 // The ankle with the loops cut by hand, driven at its universal joint.
 TEST(Standin, SerialModelIsTheRobotWithItsLoopsCut) {
   std::string text = *ReadWholeFile(SourcePath("/tests/mechanisms/parallel_ankle.yaml"));
-  text = Changed(text, {{text.substr(text.find("  left_crank: &crank"),
-                                     text.find("joints:") - text.find("  left_crank: &crank")),
-                         ""},
-                        {text.substr(text.find("  left_hinge:"),
-                                     text.find("outputs:") - text.find("  left_hinge:")),
-                         "drives:\n  pitch: {kind: joint, joint: ankle, coordinate: 0}\n"
-                         "  roll: {kind: joint, joint: ankle, coordinate: 1}\n"}});
+  text = Changed(
+      text,
+      {{text.substr(text.find("  left_crank: &crank"),
+                    text.find("joints:") - text.find("  left_crank: &crank")),
+        ""},
+       {text.substr(text.find("  left_hinge:"), text.find("outputs:") - text.find("  left_hinge:")),
+        "drives:\n  pitch: {kind: joint, joint: ankle, coordinate: 0}\n"
+        "  roll: {kind: joint, joint: ankle, coordinate: 1}\n"}});
   const Mechanism cut = Loaded(
       text + "elements:\n  tendon: {kind: spring, joint: ankle, coordinate: 0, stiffness: 3}\n");
   ReducedModel serial(cut, {{Coordinate::Kind::kDrive, 0, 0}, {Coordinate::Kind::kDrive, 1, 0}});
@@ -205,12 +206,12 @@ TEST(Standin, SerialModelIsTheRobotWithItsLoopsCut) {
 
 // Without masses of cranks and rods: rotors turn with m̈ = J a + J̇ v.
 TEST(Standin, RotorsAreCountedAtTheDrives) {
-  const Mechanism ankle = Ankle(
-      {{"m_rod: {value: 0.08, unit: kg}", "m_rod: {value: 0, unit: kg}"},
-       {"m_crank: {value: 0.06, unit: kg}", "m_crank: {value: 0, unit: kg}"},
-       {"inertia: [4.0e-6, m_crank", "inertia: [0, m_crank"},
-       {"m_rod*rod^2/12, 2.0e-6]", "m_rod*rod^2/12, 0]"}},
-      kRotors);
+  const Mechanism ankle =
+      Ankle({{"m_rod: {value: 0.08, unit: kg}", "m_rod: {value: 0, unit: kg}"},
+             {"m_crank: {value: 0.06, unit: kg}", "m_crank: {value: 0, unit: kg}"},
+             {"inertia: [4.0e-6, m_crank", "inertia: [0, m_crank"},
+             {"m_rod*rod^2/12, 2.0e-6]", "m_rod*rod^2/12, 0]"}},
+            kRotors);
   const StandinResult result = ComputeStandin(ankle, kPitchRoll, Grid(5));
   ASSERT_EQ(result.usable(), 25u) << result.diagnostics.Text();
   MatX mean = MatX::Zero(2, 2);
@@ -220,12 +221,12 @@ TEST(Standin, RotorsAreCountedAtTheDrives) {
     mean += kRotor * J.transpose() * J / 25.0;
     const StandinState& state = pose.moving;
     constexpr double kStep = 1e-6;  // central differences: 1e-9 of J̇
-    const MatX J_rate = (AnkleByHand(pose.q + kStep * state.v).J -
-                         AnkleByHand(pose.q - kStep * state.v).J) /
-                        (2 * kStep);
+    const MatX J_rate =
+        (AnkleByHand(pose.q + kStep * state.v).J - AnkleByHand(pose.q - kStep * state.v).J) /
+        (2 * kStep);
     const MatX to_drives = J.transpose().inverse();
-    const VecX rotors = kRotor * (J * state.a), armature = to_drives * result.armature.asDiagonal() *
-                                                           state.a;
+    const VecX rotors = kRotor * (J * state.a),
+               armature = to_drives * result.armature.asDiagonal() * state.a;
     EXPECT_LT((state.errors[1] - (rotors - armature)).norm(), 1e-9 * rotors.norm());
     EXPECT_LT((state.errors[2] - kRotor * J_rate * state.v).norm(),
               1e-7 * (kRotor * J_rate * state.v).norm());
@@ -368,8 +369,8 @@ TEST(Standin, LimitsOfTheMotorsAtHome) {
     const MatX back = pose.J.transpose().inverse();
     double most = 0.0;
     for (int k = 0; k < 720; ++k) {
-      const VecX joint = pose.torque_any * Eigen::Vector2d(std::cos(k * kDeg / 2),
-                                                           std::sin(k * kDeg / 2));
+      const VecX joint =
+          pose.torque_any * Eigen::Vector2d(std::cos(k * kDeg / 2), std::sin(k * kDeg / 2));
       most = std::max(most, (back * joint).cwiseAbs().maxCoeff());
     }
     EXPECT_LE(most, 8 * (1 + 1e-12));
@@ -407,8 +408,7 @@ TEST(Standin, SingularAndOpenPosesAreNotUsed) {
     const Vec3 lever(-0.04 * std::cos(pose.q[0]), 0, 0.04 * std::sin(pose.q[0]));
     const Vec3 crank(-0.05 * std::cos(pose.drives[0]), 0, 0.05 * std::sin(pose.drives[0]));
     const Vec3 rod = Vec3(0, 0, -0.3) + lever - crank;
-    const double ratio =
-        rod.dot(Vec3::UnitY().cross(lever)) / rod.dot(Vec3::UnitY().cross(crank));
+    const double ratio = rod.dot(Vec3::UnitY().cross(lever)) / rod.dot(Vec3::UnitY().cross(crank));
     EXPECT_EQ(pose.status == PoseStatus::kBeyond, ratio < 0) << pose.q;
   }
   EXPECT_GT(result.CountOf(PoseStatus::kBeyond), 10u);
