@@ -136,11 +136,10 @@ std::string ErrorSentence(const StandinResult& result, const StandinScene& scene
   const Spread& error = scene.errors[whole.drive][kWhole];
   const double needed = scene.full_p95[whole.drive];
   return fmt::format(
-      "{}: the serial model's torque of {} is wrong by {} of the {} {} that it needs in the "
-      "median, "
-      "by more than {} in 5 % of the states; most of it by {} ({}): {}",
-      scene.name, result.drives[whole.drive], Percent(error.median / needed), Short(needed),
-      ForceUnitOf(result.drive_units[whole.drive]), Percent(error.p95 / needed),
+      "{}: the serial model's torque of {} is wrong by {} in the median, by more than {} in 5 % of "
+      "the states, of the {} {} that it needs; most of it by {} ({}): {}",
+      scene.name, result.drives[whole.drive], Percent(error.median / needed),
+      Percent(error.p95 / needed), Short(needed), ForceUnitOf(result.drive_units[whole.drive]),
       kCauseNames.at(cause), Percent(WorstDriveOf(scene, cause).share), RemedyOf(cause));
 }
 
@@ -165,10 +164,11 @@ Table RatioTable(const StandinResult& result) {
   Table table{.name = "standin_ratio",
               .caption = "Neutral ratio J₀ = ∂m/∂q at home, and drives over the usable poses",
               .columns = {Text("drive")}};
-  for (const std::string& joint : result.joints) table.columns.push_back(Digits("by " + joint));
-  for (const char* title : {"unit", "from", "to", "unit"}) {
-    table.columns.push_back(std::string(title) == "unit" ? Text(title) : Digits(title));
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    table.columns.push_back(
+        Digits("by " + result.joints[k] + " [1/" + result.joint_units[k] + "]"));
   }
+  table.columns.insert(table.columns.end(), {Text("unit"), Digits("from"), Digits("to"), Text("")});
   for (size_t d = 0; d < result.drives.size(); ++d) {
     std::vector<Cell> row = {result.drives[d]};
     for (size_t k = 0; k < result.joints.size(); ++k) {
@@ -181,7 +181,7 @@ Table RatioTable(const StandinResult& result) {
       high = std::max(high, pose.drives[Ix(d)]);
     }
     const std::string& unit = result.drive_units[d];
-    row.emplace_back(unit + "/" + result.joint_units[0]);
+    row.emplace_back(unit);
     row.emplace_back(Short(InShownUnit(low, unit)));
     row.emplace_back(Short(InShownUnit(high, unit)));
     row.emplace_back(ShownUnit(unit));
@@ -403,7 +403,7 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
   ReportSection error{.title = "Error of the serial model", .link = "Error"};
   for (const StandinScene& scene : result.scenes) error.Add(SceneTable(result, scene));
   error.Note(
-      "Motor torques of the serial model less those of the full loop, by cause: constant ratio, "
+      "Motor torques of the full loop less those of the serial model, by cause: constant ratio, "
       "the "
       "neutral J instead of J(q); rotors, their inertia beyond the best constant armature; "
       "velocity, "

@@ -462,8 +462,9 @@ TEST(Standin, SentencesFollowTheNumbers) {
   scene.errors[1][kWhole] = {.median = 0.2, .p95 = 0.6, .worst = 1.0};
   scene.errors[1][2].p95 = 0.5;
   EXPECT_THAT(AdviceOf(result)[2],
-              testing::AllOf(HasSubstr("of right is wrong by 10 % of the 2 N m"),
-                             HasSubstr("by more than 30 %"), HasSubstr("by velocity (25 %)")));
+              testing::AllOf(HasSubstr("of right is wrong by 10 % in the median"),
+                             HasSubstr("by more than 30 % in 5 % of the states, of the 2 N m"),
+                             HasSubstr("by velocity (25 %)")));
 }
 
 }  // namespace
