@@ -124,6 +124,7 @@ const char* RemedyOf(size_t cause) {
 }
 
 std::string ErrorSentence(const StandinResult& result, const StandinScene& scene) {
+  if (scene.states == 0) return scene.name + ": no state can be used; state a smaller --range";
   const WorstDrive whole = WorstDriveOf(scene, kWhole);
   if (!(whole.share > kSmall)) {
     return fmt::format("{}: the serial model's motor torques are right within {} of what is needed",
@@ -305,7 +306,7 @@ Table SceneTable(const StandinResult& result, const StandinScene& scene) {
 
 template <typename Value>
 void AddMap(const StandinResult& result, const std::string& title, const std::string& unit,
-            const Value& value, ReportSection* section) {
+            const Value& value, ReportSection* section, bool log = false) {
   const auto shown = [&](const StandinPose& pose) {
     return pose.status == PoseStatus::kUsable ? value(pose) : kNan;
   };
@@ -328,7 +329,8 @@ void AddMap(const StandinResult& result, const std::string& title, const std::st
                .x_label = label(0),
                .y_label = label(1),
                .value_label = "[" + unit + "]",
-               .values = {}};
+               .values = {},
+               .log_scale = log};
   const auto edges = [&](size_t k, double* low, double* high) {
     const StandinRange& range = result.ranges[k];
     const double half = 0.5 * (range.high - range.low) / (result.resolution - 1);
@@ -460,7 +462,7 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
     if (!(result.armature[Ix(k)] > 0.0)) continue;
     AddMap(
         result, "rotors about " + result.joints[k], result.joint_units[k] == "rad" ? "kg m²" : "kg",
-        [&](const StandinPose& pose) { return pose.R(Ix(k), Ix(k)); }, &inertia);
+        [&](const StandinPose& pose) { return pose.R(Ix(k), Ix(k)); }, &inertia, true);
   }
   sections.push_back(std::move(inertia));
 
@@ -574,7 +576,7 @@ std::vector<std::string> AdviceOf(const StandinResult& result) {
   }
   advice.push_back(ReachSentence(result));
   for (const StandinScene& scene : result.scenes) {
-    if (scene.states > 0) advice.push_back(ErrorSentence(result, scene));
+    advice.push_back(ErrorSentence(result, scene));
   }
   if (result.inertia_off.worst > kSmall || result.coupling.worst > kSmall) {
     std::string text = fmt::format(
@@ -689,6 +691,15 @@ std::string StandinCsv(const StandinResult& result) {
   per(result.joints, " peak torque alone",
       [&](size_t k) { return ForceUnitOf(result.joint_units[k]); });
   per(result.joints, " highest rate alone", [&](size_t k) { return result.joint_units[k] + "/s"; });
+  const bool polygons[] = {n == 2 && result.torque_limits, n == 2 && result.speed_limits};
+  for (const bool torque : {true, false}) {
+    if (!polygons[torque ? 0 : 1]) continue;
+    for (const char* corner : {" corner 1", " corner 2"}) {
+      per(result.joints, std::string(torque ? " torque" : " rate") + corner, [&](size_t k) {
+        return torque ? ForceUnitOf(result.joint_units[k]) : result.joint_units[k] + "/s";
+      });
+    }
+  }
   per(result.drives, " at rest", force_unit);
   for (const char* cause : kCauseNames) {
     per(result.drives, std::string(" error at rest: ") + cause, force_unit);
@@ -720,6 +731,15 @@ std::string StandinCsv(const StandinResult& result) {
     }
     numbers(pose.torque_alone);
     numbers(pose.speed_alone);
+    for (const bool torque : {true, false}) {
+      if (!polygons[torque ? 0 : 1]) continue;
+      const auto corners = pose.status == PoseStatus::kUsable
+                               ? CornersAt(result, pose, torque)
+                               : std::vector<std::array<double, 2>>(2, {kNan, kNan});
+      for (size_t c = 0; c < 2; ++c) {
+        for (const double value : corners[c]) number(value);
+      }
+    }
     numbers(pose.rest.full);
     for (const VecX& error : pose.rest.errors) numbers(error);
     row.back() = '\n';

@@ -110,6 +110,16 @@ class TransmissionFinder {
       depend.push_back(candidates[k].name);
     }
     if (depend.empty()) return true;
+    std::vector<NamedCoordinate> alone = Fixed();
+    for (const NamedCoordinate& joint : found_.joints) {
+      if (!Contains(depend, joint.name)) continue;
+      alone.push_back(joint);
+      if (!Choose(alone, alone.size()).dependent.empty()) {
+        return Error("'" + joint.name + "' cannot move at home",
+                     "choose joints that move, or another home pose (guesses of the model)");
+      }
+      alone.pop_back();
+    }
     return Error(fmt::format("joints that depend on each other at home: {} on those before",
                              Joined(depend, kNamed)),
                  "leave out " + Joined(depend, kNamed));

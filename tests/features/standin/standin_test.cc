@@ -379,6 +379,86 @@ TEST(Standin, LimitsOfTheMotorsAtHome) {
   EXPECT_FALSE(ComputeStandin(Ankle(), kPitchRoll, Grid(2)).torque_limits);
 }
 
+// In the table of all poses, too: Jᵀ (8, 8) and Jᵀ (−8, 8) at home.
+TEST(Standin, TableHasTheCornersOfThePolygons) {
+  const std::string csv = StandinCsv(ComputeStandin(Ankle({}, kRotors), kPitchRoll, Grid(3)));
+  std::vector<std::vector<std::string>> rows;
+  for (size_t at = 0; at < csv.size();) {
+    const size_t end = csv.find('\n', at);
+    rows.emplace_back(1);
+    for (; at < end; ++at) {
+      if (csv[at] == ',')
+        rows.back().emplace_back();
+      else
+        rows.back().back() += csv[at];
+    }
+    ++at;
+  }
+  ASSERT_EQ(rows.size(), 10u);
+  const auto home = [&](const std::string& heading) {
+    const auto at = std::ranges::find(rows[0], heading);
+    EXPECT_NE(at, rows[0].end()) << heading;
+    return at == rows[0].end() ? kNan : std::stod(rows[5][size_t(at - rows[0].begin())]);
+  };
+  EXPECT_NEAR(home("ankle.0 torque corner 1 [N m]"), 16, 1e-9);
+  EXPECT_NEAR(home("ankle.1 torque corner 1 [N m]"), 0, 1e-9);
+  EXPECT_NEAR(home("ankle.0 torque corner 2 [N m]"), 0, 1e-9);
+  EXPECT_NEAR(home("ankle.1 torque corner 2 [N m]"), -12.8, 1e-9);
+  EXPECT_NEAR(home("ankle.0 rate corner 1 [rad/s]"), 100, 1e-9);
+  EXPECT_NEAR(home("ankle.1 rate corner 2 [rad/s]"), -125, 1e-9);
+  EXPECT_NEAR(home("d right / d ankle.1 [rad/rad]"), -0.8, 1e-9);
+}
+
+// A flap on a cylinder: length and ratio of the triangle, forces in N, rates in m/rad.
+TEST(Standin, CylinderOfAFlap) {
+  const Mechanism flap = Loaded(R"(name: flap
+bodies:
+  flap: {mass: 4, com: [0.3, 0, 0], inertia: [0.1, 0.2, 0.2], frames: {eye: [0.25, 0, 0.05]}}
+joints:
+  hinge: {kind: revolute, parent: world, child: flap, axis: y, range_deg: [-50, 40]}
+drives:
+  cylinder: {kind: distance, from: world.foot, to: flap.eye, range: [0.2, 0.9]}
+world: {frames: {foot: [0, 0, -0.4]}}
+elements:
+  seal: {kind: damping, drive: cylinder, damping: 30}
+)");
+  const StandinResult result = ComputeStandin(flap, {"hinge"}, {.ranges = {}, .resolution = 31});
+  ASSERT_EQ(result.usable(), 31u) << result.diagnostics.Text();
+  EXPECT_EQ(result.unit, "m/rad");
+  EXPECT_NEAR(result.poses.front().q[0], -50 * kDeg, 1e-12);
+  EXPECT_NEAR(result.poses.back().q[0], 40 * kDeg, 1e-12);
+  const auto ratio = [](double q) {
+    const Vec3 eye(0.25 * std::cos(q) + 0.05 * std::sin(q), 0,
+                   -0.25 * std::sin(q) + 0.05 * std::cos(q));
+    const Vec3 way = eye - Vec3(0, 0, -0.4);
+    return way.dot(Vec3::UnitY().cross(eye)) / way.norm();
+  };
+  for (const StandinPose& pose : result.poses) {
+    EXPECT_NEAR(pose.J(0, 0), ratio(pose.q[0]), 1e-10);
+    EXPECT_NEAR(pose.map_error, std::abs(ratio(0) / ratio(pose.q[0]) - 1), 1e-9);
+    const double weight = -4 * 9.81 * 0.3 * std::cos(pose.q[0]);
+    EXPECT_NEAR(pose.rest.full[0], weight / ratio(pose.q[0]), 1e-8);
+    EXPECT_NEAR(pose.rest.serial[0], weight / ratio(0), 1e-8);
+    // What damps the cylinder is no part of the serial model.
+    EXPECT_NEAR(pose.moving.errors[3][0], 30 * pose.J(0, 0) * pose.moving.v[0], 1e-8);
+  }
+}
+
+TEST(Standin, PrescribedJointsStayAtHome) {
+  const StandinResult result =
+      ComputeStandin(Loaded(Changed(kKnee, {{"  hip_motor: {kind: joint, joint: hip}\n", ""}}) +
+                            "prescribed: {sway: {joint: hip}}\n"),
+                     {"knee"}, {.ranges = {}, .resolution = 5});
+  ASSERT_EQ(result.usable(), 5u) << result.diagnostics.Text();
+  EXPECT_THAT(result.held, ElementsAre("ankle_motor"));
+  EXPECT_THAT(result.notes, ElementsAre("prescribed 'sway' stays at home"));
+  EXPECT_TRUE(
+      ComputeStandin(Loaded(Changed(kKnee, {{"  hip_motor: {kind: joint, joint: hip}\n", ""}}) +
+                            "prescribed: {sway: {joint: hip}}\n"),
+                     {"hip"}, {})
+          .diagnostics.has_errors());
+}
+
 TEST(Standin, DriveRangesEndTheRange) {
   const Mechanism narrow =
       Ankle({{"left: {kind: joint, joint: left_hinge}",
@@ -423,6 +503,17 @@ TEST(Standin, RefusesWhatHasNoSerialModel) {
     return result.diagnostics.Text();
   };
   const Mechanism ankle = Ankle();
+  // A triangle of three hinges beside it.
+  const std::string locked =
+      "bodies:\n  a: {mass: 1, inertia: [1, 1, 1], frames: {end: [1, 0, 0]}}\n"
+      "  b: {mass: 1, inertia: [1, 1, 1], frames: {end: [-1, 0, 1]}}\n"
+      "  c: {mass: 1, inertia: [1, 1, 1]}\njoints:\n"
+      "  A: {kind: revolute, parent: world, child: a, axis: y}\n"
+      "  B: {kind: revolute, parent: a.end, child: b, axis: y}\n"
+      "  C: {kind: revolute, parent: world.top, child: b.end, axis: y}\n"
+      "  D: {kind: revolute, parent: world, child: c, axis: y}\n"
+      "world: {frames: {top: [0, 0, 1]}}\ndrives: {motor: {kind: joint, joint: D}}\n";
+  EXPECT_THAT(text(Loaded("name: locked\n" + locked), {"A"}), HasSubstr("'A' cannot move at home"));
   EXPECT_THAT(text(ankle, {"ankle.0", "ankel.1"}), HasSubstr("did you mean 'ankle.1'?"));
   EXPECT_THAT(text(ankle, {"ankle.0", "ankle.0"}), HasSubstr("chosen twice"));
   EXPECT_THAT(text(ankle, {"ankle.0"}),
@@ -459,6 +550,8 @@ TEST(Standin, SentencesFollowTheNumbers) {
     scene.errors[0][c] = scene.errors[1][c] = {.median = 0.0, .p95 = 0.0, .worst = 0.0};
   }
   EXPECT_THAT(AdviceOf(result)[2], HasSubstr("are right within 0 %"));
+  result.scenes[1].states = 0;
+  EXPECT_THAT(AdviceOf(result)[3], HasSubstr("In motion: no state can be used"));
   scene.errors[1][kWhole] = {.median = 0.2, .p95 = 0.6, .worst = 1.0};
   scene.errors[1][2].p95 = 0.5;
   EXPECT_THAT(AdviceOf(result)[2],
