@@ -53,6 +53,7 @@ struct Part {
   static std::vector<Coordinate> Chosen(const std::vector<Coordinate>& coordinates,
                                         const std::vector<Eigen::Index>& taken) {
     std::vector<Coordinate> chosen;
+    chosen.reserve(taken.size());
     for (const Eigen::Index k : taken) chosen.push_back(coordinates[At(k)]);
     return chosen;
   }
@@ -464,6 +465,9 @@ class StandinComputer {
 
   void FindWorst() {
     double torque = kNoLimit, speed = kNoLimit;
+    result_.worst_torque = result_.worst_speed = static_cast<size_t>(
+        std::ranges::find(result_.poses, PoseStatus::kUsable, &StandinPose::status) -
+        result_.poses.begin());
     for (size_t i = 0; i < result_.poses.size(); ++i) {
       if (result_.poses[i].torque_any < torque) {
         torque = result_.poses[i].torque_any;

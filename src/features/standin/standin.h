@@ -115,7 +115,8 @@ struct StandinResult {
   Spread inertia_off;                             ///< |R_ii − A_i| / A_i, all joints
   Spread coupling;                                ///< |R_ij| / √(R_ii R_jj)
   Spread map_error;                               ///< at usable poses; `at`: index in `poses`
-  size_t worst_torque = 0, worst_speed = 0;       ///< poses of the least torque_any, speed_any
+  /// Poses of the least torque_any, speed_any; the first usable one where joints differ in unit.
+  size_t worst_torque = 0, worst_speed = 0;
   VecX drive_forces, drive_speeds;  ///< limits by the motors, per drive; infinite: none
   bool torque_limits = false, speed_limits = false;  ///< of all drives
   std::vector<StandinScene> scenes;

@@ -96,6 +96,7 @@ class TransmissionFinder {
   [[nodiscard]] CoordinateChoice Choose(const std::vector<NamedCoordinate>& candidates,
                                         size_t preferred) const {
     std::vector<Coordinate> coordinates;
+    coordinates.reserve(candidates.size());
     for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
     return ChooseCoordinates(mechanism_, coordinates, preferred);
   }

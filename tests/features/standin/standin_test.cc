@@ -144,8 +144,8 @@ TEST(Standin, TorqueMapErrorIsOfTheRatiosByHand) {
 }
 
 TEST(Standin, SpreadTakesNearestRanks) {
-  std::vector<double> values;
-  for (int i = 0; i < 20; ++i) values.push_back(20 - i);
+  std::vector<double> values(20);
+  for (size_t i = 0; i < 20; ++i) values[i] = 20.0 - static_cast<double>(i);
   const Spread spread = SpreadOf(values);
   EXPECT_EQ(spread.median, 10);
   EXPECT_EQ(spread.p95, 19);
@@ -173,6 +173,19 @@ TEST(Standin, CausesAddUpToTheBalanceOfAllBodies) {
                 (c == 0 && pose.q.norm() > 1e-9) || c == 3 || c == kWhole)
           << kCauseNames[c] << pose.q.transpose();
     }
+  }
+
+  // A part in a million of a rod's mass would be seen.
+  const StandinResult heavier = ComputeStandin(
+      Ankle({{"m_rod: {value: 0.08, unit: kg}", "m_rod: {value: 0.08000008, unit: kg}"}},
+            std::string(kRotors) + kForces),
+      kPitchRoll, Grid(9));
+  for (size_t i = 0; i < result.poses.size(); ++i) {
+    const StandinState& state = result.poses[i].moving;
+    VecX off = heavier.poses[i].moving.full - state.serial;
+    for (size_t c = 0; c < kCauses; ++c) off -= state.errors[c];
+    EXPECT_GT(off.norm(), 1e-9 * state.full.norm());
+    EXPECT_LT(off.norm(), 1e-5 * state.full.norm());
   }
 }
 
@@ -442,6 +455,55 @@ elements:
     // What damps the cylinder is no part of the serial model.
     EXPECT_NEAR(pose.moving.errors[3][0], 30 * pose.J(0, 0) * pose.moving.v[0], 1e-8);
   }
+}
+
+// A slide and a hinge on it, each with its motor: no ratio, no error, units that differ.
+TEST(Standin, JointsOfDifferentUnits) {
+  const Mechanism cart = Loaded(R"(name: cart
+bodies:
+  cart: {mass: 3, inertia: [0.1, 0.1, 0.1]}
+  arm: {mass: 1, com: [0.3, 0, 0], inertia: [0.01, 0.02, 0.02]}
+joints:
+  slide: {kind: prismatic, parent: world, child: cart, axis: x, range_mm: [-200, 200]}
+  turn: {kind: revolute, parent: cart, child: arm, axis: y}
+drives:
+  belt: {kind: joint, joint: slide, range_mm: [-160, 300]}
+  motor: {kind: joint, joint: turn}
+motors:
+  belt: {peak: 2, max_speed: 400, lead: 0.1}
+  motor: {peak: 1, max_speed: 300, gear_ratio: 6}
+)");
+  const StandinResult result =
+      ComputeStandin(cart, {"slide", "turn"}, {.ranges = {}, .resolution = 9});
+  ASSERT_EQ(result.usable(), 8u * 9u) << result.diagnostics.Text();
+  EXPECT_THAT(result.unit, testing::StartsWith("1, lengths in "));
+  EXPECT_THAT(result.drive_units, ElementsAre("m", "rad"));
+  EXPECT_LT(result.map_error.worst, 1e-12);
+  const StandinPose& pose = result.poses[40];
+  EXPECT_NEAR(pose.torque_alone[0], 2 * 2 * std::numbers::pi / 0.1, 1e-9);
+  EXPECT_NEAR(pose.torque_alone[1], 6, 1e-12);
+  EXPECT_TRUE(std::isnan(pose.torque_any));
+  const auto json = ToJson(result, "cart");
+  EXPECT_TRUE(json["torque_limits"]["any"].is_null());
+  EXPECT_NEAR(json["torque_limits"]["alone"][1]["least"].get<double>(), 6.0, 1e-12);
+  EXPECT_THAT(StandinPage(result, "cart"), HasSubstr("slide [mm]"));
+}
+
+TEST(Standin, ThreeJointsOfALeg) {
+  const StandinResult result =
+      ComputeStandin(Loaded(kKnee), {"hip", "knee", "ankle"}, {.ranges = {}, .resolution = 3});
+  ASSERT_EQ(result.usable(), 27u) << result.diagnostics.Text();
+  const StandinResult knee =
+      ComputeStandin(Loaded(kKnee), {"knee"}, {.ranges = {}, .resolution = 3});
+  for (size_t i = 0; i < 27; ++i) {
+    const MatX& J = result.poses[i].J;
+    EXPECT_NEAR(J(0, 0), 1, 1e-12);
+    EXPECT_NEAR(J(1, 1), knee.poses[i / 3 % 3].J(0, 0), 1e-10);
+    EXPECT_NEAR(J(2, 2), 1, 1e-12);
+    EXPECT_LT((J - MatX(J.diagonal().asDiagonal())).norm(), 1e-10);
+  }
+  for (const StandinScene& scene : result.scenes) EXPECT_LT(scene.sum_off, 1e-10);
+  EXPECT_THAT(StandinPage(result, "leg"), HasSubstr("Error of the serial model"));
 }
 
 TEST(Standin, PrescribedJointsStayAtHome) {
