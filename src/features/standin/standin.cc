@@ -365,6 +365,15 @@ class StandinComputer {
     }
   }
 
+  // The drive that is beyond its range, or "".
+  [[nodiscard]] std::string BeyondRange(const VecX& drives) const {
+    for (Eigen::Index k = 0; k < n_; ++k) {
+      const CoordinateRange& range = transmission_.ranges[At(k)];
+      if (drives[k] < range.lower || drives[k] > range.upper) return result_.drives[At(k)];
+    }
+    return "";
+  }
+
   void Look(StandinPose* pose) {
     const VecX still = VecX::Zero(n_);
     if (const RunSummary summary = parts_->Move(pose->q, still, still); !summary.ok()) {
@@ -379,13 +388,8 @@ class StandinComputer {
     pose->largest = svd.singularValues()[0];
     pose->M = parts_->MassMatrix();
     pose->R = parts_->RotorMatrix();
-    pose->status = PoseStatus::kUsable;
-    for (Eigen::Index k = 0; k < n_; ++k) {
-      const CoordinateRange& range = transmission_.ranges[At(k)];
-      if (pose->drives[k] >= range.lower && pose->drives[k] <= range.upper) continue;
-      pose->status = PoseStatus::kDriveRange;
-      pose->where = result_.drives[At(k)];
-    }
+    pose->where = BeyondRange(pose->drives);
+    pose->status = pose->where.empty() ? PoseStatus::kUsable : PoseStatus::kDriveRange;
     if ((pose->J.determinant() > 0.0) != sign_ || !(pose->least > kRegular * pose->largest)) {
       pose->status = PoseStatus::kBeyond;
       pose->where = "type 2 singularity";
@@ -552,7 +556,8 @@ class StandinComputer {
         a[k] = -omega * omega * swing;
       }
       StandinState& state = states[static_cast<size_t>(i)];
-      if (parts_->Move(q, v, a).ok() && (parts_->J().determinant() > 0.0) == sign_) {
+      if (parts_->Move(q, v, a).ok() && (parts_->J().determinant() > 0.0) == sign_ &&
+          BeyondRange(parts_->drives()).empty()) {
         Evaluate(&state);
       }
       scene.emplace_back(q, &state);

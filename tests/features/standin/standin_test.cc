@@ -525,7 +525,9 @@ TEST(Standin, DriveRangesEndTheRange) {
   const Mechanism narrow =
       Ankle({{"left: {kind: joint, joint: left_hinge}",
               "left: {kind: joint, joint: left_hinge, range_deg: [-20, 25]}"}});
-  const StandinResult result = ComputeStandin(narrow, kPitchRoll, Grid(11));
+  StandinSettings settings = Grid(11);
+  settings.amplitude = 0.9;
+  const StandinResult result = ComputeStandin(narrow, kPitchRoll, settings);
   size_t beyond = 0;
   for (const StandinPose& pose : result.poses) {
     const double left = AnkleByHand(pose.q).drives[0];
@@ -535,6 +537,18 @@ TEST(Standin, DriveRangesEndTheRange) {
     beyond += out ? 1 : 0;
   }
   EXPECT_GT(beyond, 20u);
+  // Of the motion, too: 27° sin and 27° cos.
+  const StandinScene& motion = result.scenes[1];
+  size_t left_out = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double phase = 2 * std::numbers::pi * i / 400;
+    const double left =
+        AnkleByHand(27 * kDeg * Eigen::Vector2d(std::sin(phase), std::cos(phase))).drives[0];
+    left_out += left < -20 * kDeg || left > 25 * kDeg ? 1 : 0;
+  }
+  EXPECT_GT(left_out, 10u);
+  EXPECT_EQ(motion.left_out, left_out);
+  EXPECT_EQ(motion.states + left_out, 400u);
   EXPECT_EQ(result.usable() + beyond, 121u);
   EXPECT_THAT(AdviceOf(result)[1], HasSubstr("range of drive left"));
 }
