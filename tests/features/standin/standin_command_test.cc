@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/json_schemas.h"
 #include "tests/support/run_program.h"
 
 namespace mbv {
@@ -47,6 +48,30 @@ TEST_F(StandinCommand, WritesPageTableAndNumbers) {
       "--joints ankle.0,ankle.1 --range ankle.0_deg=-20:10 --range ankle.1=-0.2:0.2 --resolution 7 "
       "--json -");
   EXPECT_EQ(again.out, result.out);
+}
+
+// Limits of motors are null without motors: with some their schema is held, too.
+TEST_F(StandinCommand, NumbersOfMotorsFitTheSchema) {
+  const std::string file = (mbverify.folder() / "ankle.yaml").string();
+  std::ofstream(file) << ReadAll(SourcePath("/tests/mechanisms/parallel_ankle.yaml"))
+                      << "motors:\n  left: {peak: 2, max_speed: 9, rotor_inertia: 1.0e-5}\n"
+                         "  right: {peak: 2, max_speed: 9, rotor_inertia: 1.0e-5}\n";
+  const ProgramResult result = mbverify("standin '" + file + "' --out '" + mbverify.Out() +
+                                        "' --joints ankle.0,ankle.1 --resolution 3 --json -");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const test::JsonSchemas schemas;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(schemas.Misfit(json), "");
+  ASSERT_EQ(json["torque_limits"]["corners"].size(), 4u);
+  for (const char* limits : {"torque_limits", "speed_limits"}) {
+    for (const auto& [key, value] : json[limits].items()) {
+      auto renamed = json, typed = json;
+      renamed[limits].erase(key);
+      typed[limits][key] = "text";
+      EXPECT_NE(schemas.Misfit(renamed), "") << limits << " " << key;
+      EXPECT_NE(schemas.Misfit(typed), "") << limits << " " << key;
+    }
+  }
 }
 
 TEST_F(StandinCommand, RefusesBadInputWithAHint) {
