@@ -190,30 +190,64 @@ TEST(Standin, CausesAddUpToTheBalanceOfAllBodies) {
 }
 
 // The ankle with the loops cut by hand, driven at its universal joint.
-TEST(Standin, SerialModelIsTheRobotWithItsLoopsCut) {
+Mechanism CutAnkle(const std::string& more = "") {
   std::string text = *ReadWholeFile(SourcePath("/tests/mechanisms/parallel_ankle.yaml"));
-  text = Changed(
-      text,
-      {{text.substr(text.find("  left_crank: &crank"),
-                    text.find("joints:") - text.find("  left_crank: &crank")),
-        ""},
-       {text.substr(text.find("  left_hinge:"), text.find("outputs:") - text.find("  left_hinge:")),
-        "drives:\n  pitch: {kind: joint, joint: ankle, coordinate: 0}\n"
-        "  roll: {kind: joint, joint: ankle, coordinate: 1}\n"}});
-  const Mechanism cut = Loaded(
-      text + "elements:\n  tendon: {kind: spring, joint: ankle, coordinate: 0, stiffness: 3}\n");
-  ReducedModel serial(cut, {{Coordinate::Kind::kDrive, 0, 0}, {Coordinate::Kind::kDrive, 1, 0}});
+  const auto part = [&](const char* from, const char* to) {
+    return text.substr(text.find(from), text.find(to) - text.find(from));
+  };
+  return Loaded(Changed(text, {{part("  left_crank: &crank", "joints:"), ""},
+                               {part("  left_hinge:", "outputs:"),
+                                "drives:\n  pitch: {kind: joint, joint: ankle, coordinate: 0}\n"
+                                "  roll: {kind: joint, joint: ankle, coordinate: 1}\n"}}) +
+                more);
+}
+
+// Forces along its joints [N m].
+VecX JointForces(ReducedModel* model, const VecX& q, const VecX& v, const VecX& a) {
+  EXPECT_TRUE(model->Move(q, v, a).ok());
+  MatX T;
+  EXPECT_TRUE(model->Motions(&T).ok());
+  return model->Forces(T, {});
+}
+ReducedModel ModelOf(const Mechanism& mechanism) {
+  return {mechanism, std::vector<Coordinate>{{Coordinate::Kind::kJoint, 0, 0},
+                                             {Coordinate::Kind::kJoint, 0, 1}}};
+}
+
+TEST(Standin, SerialModelIsTheRobotWithItsLoopsCut) {
+  const Mechanism cut =
+      CutAnkle("elements:\n  tendon: {kind: spring, joint: ankle, coordinate: 0, stiffness: 3}\n");
+  ReducedModel serial = ModelOf(cut);
   const StandinResult result =
       ComputeStandin(Ankle({}, std::string(kRotors) + kForces), kPitchRoll, Grid(5));
   for (const StandinPose& pose : result.poses) {
     for (const StandinState* state : {&pose.rest, &pose.moving}) {
-      ASSERT_TRUE(serial.Move(pose.q, state->v, state->a).ok());
-      ASSERT_TRUE(serial.AllForces({}).ok());
-      const VecX joint = serial.drive_force() + result.armature.cwiseProduct(state->a);
+      const VecX joint =
+          JointForces(&serial, pose.q, state->v, state->a) + result.armature.cwiseProduct(state->a);
       const VecX by_hand = AnkleByHand(VecX::Zero(2)).J.transpose().inverse() * joint;
       EXPECT_LT((state->serial - by_hand).norm(), 1e-10 * by_hand.norm());
       EXPECT_GT((state->serial - joint).norm(), 1e-3 * by_hand.norm());
     }
+  }
+}
+
+// What the rods add to the cut ankle: at rest or accelerated without a rate their mass and weight,
+// the rest is of rates.
+TEST(Standin, LoopBodiesByTheirMassAndByTheirRates) {
+  const Mechanism ankle = Ankle(), cut = CutAnkle();
+  ReducedModel full = ModelOf(ankle), serial = ModelOf(cut);
+  const StandinResult result = ComputeStandin(ankle, kPitchRoll, Grid(5));
+  for (const StandinPose& pose : result.poses) {
+    const StandinState& state = pose.moving;
+    const auto added = [&](const VecX& v) {
+      const VecX more =
+          JointForces(&full, pose.q, v, state.a) - JointForces(&serial, pose.q, v, state.a);
+      return VecX(AnkleByHand(pose.q).J.transpose().inverse() * more);
+    };
+    const VecX still = added(VecX::Zero(2)), moving = added(state.v);
+    EXPECT_LT((state.errors[3] - still).norm(), 1e-9 * still.norm());
+    EXPECT_LT((state.errors[2] - (moving - still)).norm(), 1e-9 * still.norm());
+    EXPECT_GT((moving - still).norm(), 1e-7 * still.norm());
   }
 }
 
