@@ -143,6 +143,27 @@ TEST(Standin, TorqueMapErrorIsOfTheRatiosByHand) {
   EXPECT_GT(result.map_error.p95, 1.5 * result.map_error.median);
 }
 
+// The nearest poses to both kinds of singularity.
+TEST(Standin, SingularValuesAreOfTheRatiosByHand) {
+  const StandinResult result = ComputeStandin(Ankle(), kPitchRoll, Grid(9));
+  EXPECT_EQ(result.unit, "1");
+  EXPECT_NEAR(result.largest_home, std::sqrt(2.0), 1e-10);
+  EXPECT_NEAR(result.least_home, 0.8 * std::sqrt(2.0), 1e-10);
+  double least = 10.0, largest = 0.0;
+  for (const StandinPose& pose : result.poses) {
+    const MatX J = AnkleByHand(pose.q).J;
+    const double s = J.squaredNorm(), d = J.determinant(), r = std::sqrt(s * s - 4 * d * d);
+    EXPECT_NEAR(pose.least, std::sqrt(0.5 * (s - r)), 1e-9);
+    EXPECT_NEAR(pose.largest, std::sqrt(0.5 * (s + r)), 1e-9);
+    least = std::min(least, pose.least);
+    largest = std::max(largest, pose.largest);
+  }
+  const auto json = ToJson(result, "ankle")["singularities"];
+  EXPECT_EQ(json["type2"], least);
+  EXPECT_EQ(json["type1"], 1.0 / largest);
+  EXPECT_EQ(ToJson(result, "ankle")["drives"][1]["ratio"][1], result.J_home(1, 1));
+}
+
 TEST(Standin, SpreadTakesNearestRanks) {
   std::vector<double> values(20);
   for (size_t i = 0; i < 20; ++i) values[i] = 20.0 - static_cast<double>(i);
@@ -538,6 +559,25 @@ TEST(Standin, ThreeJointsOfALeg) {
   }
   for (const StandinScene& scene : result.scenes) EXPECT_LT(scene.sum_off, 1e-10);
   EXPECT_THAT(StandinPage(result, "leg"), HasSubstr("Error of the serial model"));
+}
+
+// A cylinder whose line goes through the hinge holds nothing, whatever round-off makes of the
+// ratio.
+TEST(Standin, PoseThatIsSingularIsNotUsed) {
+  const Mechanism flap = Loaded(R"(name: flap
+bodies:
+  flap: {mass: 4, com: [0.3, 0, 0], inertia: [0.1, 0.2, 0.2], frames: {eye: [0.25, 0, 0]}}
+joints:
+  hinge: {kind: revolute, parent: world, child: flap, axis: y, range_deg: [-50, 90]}
+drives:
+  cylinder: {kind: distance, from: world.foot, to: flap.eye}
+world: {frames: {foot: [0, 0, -0.4]}}
+)");
+  const StandinResult result = ComputeStandin(flap, {"hinge"}, {.ranges = {}, .resolution = 15});
+  ASSERT_EQ(result.poses.size(), 15u) << result.diagnostics.Text();
+  EXPECT_EQ(result.usable(), 14u);
+  EXPECT_EQ(result.poses.back().status, PoseStatus::kBeyond);
+  EXPECT_LT(std::abs(result.poses.back().J(0, 0)), 1e-12);
 }
 
 TEST(Standin, PrescribedJointsStayAtHome) {
