@@ -20,8 +20,9 @@ namespace {
 
 constexpr double kHalfRange = std::numbers::pi / 6.0;  // where neither user nor joint states one
 constexpr double kMostPoses = 200000.0;
-constexpr int kSamples = 400;      // of a period
-constexpr double kRegular = 1e-9;  // 1/condition of J below which no torque map is computed
+constexpr int kSamples = 400;  // of a period
+// Singular values below this share of the largest, there or at home, are round-off.
+constexpr double kRegular = 1e-9;
 constexpr double kMost = std::numeric_limits<double>::max();
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
@@ -390,7 +391,8 @@ class StandinComputer {
     pose->R = parts_->RotorMatrix();
     pose->where = BeyondRange(pose->drives);
     pose->status = pose->where.empty() ? PoseStatus::kUsable : PoseStatus::kDriveRange;
-    if ((pose->J.determinant() > 0.0) != sign_ || !(pose->least > kRegular * pose->largest)) {
+    if ((pose->J.determinant() > 0.0) != sign_ ||
+        !(pose->least > kRegular * std::max(pose->largest, result_.largest_home))) {
       pose->status = PoseStatus::kBeyond;
       pose->where = "type 2 singularity";
     }

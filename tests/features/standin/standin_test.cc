@@ -564,7 +564,7 @@ TEST(Standin, ThreeJointsOfALeg) {
 // A cylinder whose line goes through the hinge holds nothing, whatever round-off makes of the
 // ratio.
 TEST(Standin, PoseThatIsSingularIsNotUsed) {
-  const Mechanism flap = Loaded(R"(name: flap
+  const std::string flap = R"(name: flap
 bodies:
   flap: {mass: 4, com: [0.3, 0, 0], inertia: [0.1, 0.2, 0.2], frames: {eye: [0.25, 0, 0]}}
 joints:
@@ -572,12 +572,16 @@ joints:
 drives:
   cylinder: {kind: distance, from: world.foot, to: flap.eye}
 world: {frames: {foot: [0, 0, -0.4]}}
-)");
-  const StandinResult result = ComputeStandin(flap, {"hinge"}, {.ranges = {}, .resolution = 15});
+)";
+  const StandinResult result =
+      ComputeStandin(Loaded(flap), {"hinge"}, {.ranges = {}, .resolution = 15});
   ASSERT_EQ(result.poses.size(), 15u) << result.diagnostics.Text();
   EXPECT_EQ(result.usable(), 14u);
   EXPECT_EQ(result.poses.back().status, PoseStatus::kBeyond);
   EXPECT_LT(std::abs(result.poses.back().J(0, 0)), 1e-12);
+  const StandinResult at_home = ComputeStandin(
+      Loaded(Changed(flap, {{"range_deg: [-50, 90]", "guess_deg: 90"}})), {"hinge"}, {});
+  EXPECT_THAT(at_home.diagnostics.Text(), HasSubstr("no drive holds"));
 }
 
 TEST(Standin, PrescribedJointsStayAtHome) {
