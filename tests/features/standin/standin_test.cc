@@ -355,6 +355,49 @@ TEST(Standin, GearedJointHasNoError) {
   EXPECT_LT(heavy.scenes[1].errors[0][2].worst, 1e-12);
 }
 
+// τ = I q̈ + c q̇ + dV/dq along q = 15° sin ωt.
+TEST(Standin, MotionIsASine) {
+  const std::string smooth = Changed(
+      kGeared,
+      {{"  dry: {kind: friction, joint: hip, coulomb: 0.2, breakaway: 0.3, stribeck_rate: 0.1}\n",
+        ""}});
+  StandinSettings settings;
+  settings.frequency_hz = 3.0;
+  const StandinResult result = ComputeStandin(Loaded(smooth), {"hip"}, settings);
+  const double omega = 6 * std::numbers::pi;
+  std::vector<double> torques;
+  for (int i = 0; i < 400; ++i) {
+    const double phase = 2 * std::numbers::pi * i / 400, q = 15 * kDeg * std::sin(phase);
+    const double inertia = 0.03 + 2 * 0.05 + 3e-5 * 400 + 1e-4 * 81;
+    torques.push_back(std::abs(-inertia * omega * omega * q +
+                               0.4 * omega * 15 * kDeg * std::cos(phase) +
+                               2 * 9.81 * (0.2 * std::sin(q) - 0.1 * std::cos(q))));
+  }
+  ASSERT_EQ(result.scenes.size(), 3u) << result.diagnostics.Text();
+  EXPECT_EQ(result.scenes[1].states, 400u);
+  EXPECT_NEAR(result.scenes[1].full_p95[0], SpreadOf(torques).p95, 1e-9);
+  // What is drawn fills the motion's rates and accelerations.
+  double v = 0.0, a = 0.0;
+  for (const StandinPose& pose : result.poses) {
+    v = std::max(v, std::abs(pose.moving.v[0]));
+    a = std::max(a, std::abs(pose.moving.a[0]));
+  }
+  for (const double share : {v / (omega * 15 * kDeg), a / (omega * omega * 15 * kDeg)}) {
+    EXPECT_GT(share, 0.95);
+    EXPECT_LE(share, 1.0);
+  }
+}
+
+TEST(Standin, LimitsOfADrivesJointAreItsRange) {
+  const Mechanism limited = Loaded(
+      Changed(kGeared, {{"child: link, axis: y", "child: link, axis: y, range_deg: [-25, 15]"}}));
+  EXPECT_EQ(ComputeStandin(limited, {"hip"}, {.ranges = {}, .resolution = 9}).usable(), 9u);
+  const StandinResult wide = ComputeStandin(
+      limited, {"hip"}, {.ranges = {{"hip", -30 * kDeg, 30 * kDeg}}, .resolution = 7});
+  EXPECT_EQ(wide.usable(), 4u);  // −20 … 10
+  EXPECT_EQ(wide.CountOf(PoseStatus::kDriveRange), 3u);
+}
+
 // A knee below a hip that another drive holds: crank and rod on the thigh.
 constexpr const char* kKnee = R"(name: knee
 bodies:
