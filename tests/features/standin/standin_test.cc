@@ -738,6 +738,7 @@ TEST(Standin, SentencesFollowTheNumbers) {
   for (const char* number : {"53 %", "125 %"}) {
     EXPECT_THAT(StandinPage(result, "ankle"), HasSubstr(number));
   }
+  EXPECT_THAT(ToText(result, {}), testing::ContainsRegex("neutral ratio +11 % +53 % +125 %"));
   EXPECT_EQ(ToJson(result, "ankle")["torque_map"]["p95"], 0.53);
   result.map_error.worst = 0.009;
   EXPECT_THAT(AdviceOf(result).front(), HasSubstr("a constant gear does"));
@@ -755,6 +756,8 @@ TEST(Standin, SentencesFollowTheNumbers) {
               testing::AllOf(HasSubstr("of right is wrong by 10 % in the median"),
                              HasSubstr("by more than 30 % in 5 % of the states, of the 2 N m"),
                              HasSubstr("by velocity (25 %)")));
+  EXPECT_THAT(ToText(result, {}),
+              testing::ContainsRegex("right +all +0.2 +0.6 +1 +N m +10 % +30 % +50 %"));
 }
 
 }  // namespace
