@@ -215,6 +215,32 @@ def tip(p, theta):
         self.assertEqual(sample["outputs"], [[1.5, 0.75, 6.0]])
         self.assertEqual(read["names"], ["mass", "ratio"])
 
+    def test_edited_closed_forms(self):
+        text = self.FILE.replace("p.wrong", "p.mass * theta")
+        rows = [{"q": [0.5], "qd": [0.25], "qdd": [4.0], "load": []}]
+
+        def edited(source, part):
+            kept = rows if part == "forces" else [
+                {k: v for k, v in row.items() if k != "load"} for row in rows]
+            return {"do": "try_form", "source": source, "form": 0, "part": part, "rows": kept,
+                    "drives": ["motor"]}
+
+        given = self.answers(
+            text,
+            {"do": "load"},
+            {"do": "set", "parameters": {"ratio": 2.0, "mass": 3.0}},
+            edited(text.replace("p.ratio * sin", "-p.ratio * sin"), "drives"),
+            edited(text.replace("[p.mass * qdd.theta", "[2 * p.mass * qdd.theta"), "forces"),
+            edited(text.replace("[p.mass", "{'motor': p.mass * 5} or [p.mass"), "forces"),
+            edited(text.replace("p.mass * qdd", "nothing"), "forces"),
+            {"do": "drives", "form": 0, "q": [0.5], "qd": [0.25], "qdd": [4.0]},
+        )
+        self.assertEqual(given[2], {"rows": [[-2 * math.sin(0.5)]]})
+        self.assertEqual(given[3], {"rows": [[24.0]]})
+        self.assertEqual(given[4], {"rows": [[15.0]]})
+        self.assertIn("NameError", given[5]["failed"])
+        self.assertEqual(given[6]["values"][0][0], 2 * math.sin(0.5))
+
     def test_errors_have_a_place(self):
         _, _, sample = self.answers(
             self.FILE,

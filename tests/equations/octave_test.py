@@ -440,6 +440,33 @@ class Calls(unittest.TestCase):
         self.assertIn("'(4)'", lines[fourth["line"] - 1])
         self.assertIn("'each'", lines[fourth["end"] - 1])
 
+    def test_of_edited_closed_forms(self):
+        rows = [{"q": [0.5, 2.0], "qd": [1, 1], "qdd": [3, 4], "load": []},
+                {"q": [0.0, 1.0], "qd": [1, 1], "qdd": [-1, 0], "load": []}]
+
+        def edited(text, part):
+            kept = [{k: v for k, v in row.items() if part == "forces" or k != "load"}
+                    for row in rows]
+            return {"do": "try_form", "source": text, "form": 0, "part": part, "rows": kept,
+                    "drives": ["one", "two"]}
+
+        given, _ = answers(
+            "my_arm", OCTAVE_FILE,
+            {"do": "load"}, {"do": "set", "parameters": {"ratio": 2.0, "mass": 3.0}},
+            edited(OCTAVE_FILE.replace("sin(a) * b;", "cos(a) * b;"), "drives"),
+            edited(OCTAVE_FILE.replace("f = p.mass * qdd;", "f = -p.mass * qdd;"), "forces"),
+            edited(OCTAVE_FILE.replace("f = p.mass * qdd;", "f = nothing;"), "forces"),
+            edited(OCTAVE_FILE, "drives"),
+            {"do": "drives", "form": 0, "q": [0.5, 2.0], "qd": [1, 1], "qdd": [3, 4]},
+        )
+        for x, y in zip(sum(given[2]["rows"], []), [4 * math.cos(0.5), 1, 2, 0.5]):
+            self.assertAlmostEqual(x, y, delta=1e-14)
+        self.assertEqual(given[3], {"rows": [[-9, -12], [3, 0]]})
+        self.assertIn("nothing", given[4]["failed"])
+        # The file stays as it was loaded.
+        self.assertAlmostEqual(given[5]["rows"][0][0], 4 * math.sin(0.5), delta=1e-14)
+        self.assertAlmostEqual(given[6]["values"][0][0], 4 * math.sin(0.5), delta=1e-14)
+
     def test_of_edited_texts(self):
         rows = [{"u": [1, 2, 3], "M": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "other": 5}]
 

@@ -98,6 +98,8 @@ function [host, text] = answered(host, line)
         [host, text] = tracked(host, 'equation', call.index + 1, call, @equation_text);
       case 'try_source'
         text = try_source(host, call);
+      case 'try_form'
+        text = try_form(host, call);
       otherwise
         error('mbverify:host', 'there is no call ''%s''', call.do);
     end
@@ -586,9 +588,8 @@ function text = equation_text(host, p, k, call)
   text = ['{"rows": [', strjoin(values, ', '), ']}'];
 end
 
-function text = try_source(host, call)
-  % An edited text, in a folder of its own. It may name whatever is given, not the function's
-  % arguments alone.
+function other = load_edited(host, source)
+  % An edited text, in a folder of its own.
   folder = fullfile(host.scratch, 'edited');
   if (~exist(folder, 'dir'))
     mkdir(folder);
@@ -596,10 +597,56 @@ function text = try_source(host, call)
   [~, name] = fileparts(host.path);
   file = fullfile(folder, [name, '.m']);
   id = fopen(file, 'w');
-  fputs(id, with_all_given(host, call));
+  fputs(id, source);
   fclose(id);
+  other = load_file(host, file);
+end
+
+function text = try_form(host, call)
+  % Drives' positions or forces of an edited text at many states; errors are part of the answer.
   try
-    other = load_file(host, file);
+    other = load_edited(host, call.source);
+    forces = strcmp(call.part, 'forces');
+    rows = call.rows;
+    lists = cell(1, numel(rows));
+    for k = 1:numel(rows)
+      if (iscell(rows))
+        row = rows{k};
+      else
+        row = rows(k);
+      end
+      if (forces)
+        answer = jsondecode(sample_text(other, host.parameters, call.form + 1, row), ...
+                            'makeValidName', false);
+        values = in_order(answer, 'forces', 'named_forces', call.drives);
+      else
+        answer = jsondecode(drives_text(other, host.parameters, call.form + 1, row), ...
+                            'makeValidName', false);
+        values = in_order(answer, 'values', 'named', call.drives);
+      end
+      lists{k} = ['[', listed(values), ']'];
+    end
+    text = ['{"rows": [', strjoin(lists, ', '), ']}'];
+  catch failure
+    text = json(struct('failed', failure.message));
+  end
+end
+
+function values = in_order(answer, list, map, drives)
+  % First numbers of each, in the order of the drives.
+  if (isfield(answer, map))
+    values = cellfun(@(name) answer.(map).(name)(1), drives);
+  elseif (size(answer.(list), 2) == 3 && strcmp(list, 'values'))
+    values = answer.(list)(:, 1);
+  else
+    values = answer.(list);
+  end
+end
+
+function text = try_source(host, call)
+  % It may name whatever is given, not the function's arguments alone.
+  try
+    other = load_edited(host, with_all_given(host, call));
     text = equation_text(other, host.parameters, call.index + 1, call);
   catch failure
     text = json(struct('failed', failure.message));
