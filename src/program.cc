@@ -89,6 +89,11 @@ Diagnostics CheckEquations(const std::string& file) {
   return diagnostics;
 }
 bool IsScenario(const std::string& /*file*/, const ScenarioHead& head) { return head.is_scenario; }
+bool IsModel(const std::string& /*file*/, const ScenarioHead& head) {
+  return !head.is_scenario && head.HasKey("name") &&
+         (head.HasKey("bodies") || head.HasKey("parts") || head.HasKey("legs") ||
+          head.HasKey("urdf"));
+}
 bool IsAny(const std::string& /*file*/, const ScenarioHead& /*head*/) { return true; }
 
 constexpr std::array kDocuments = {
@@ -108,6 +113,7 @@ constexpr std::array kDocuments = {
                  .run = RunMotion,
                  .mechanism = MotionMechanism},
     DocumentKind{.name = "equations", .is = IsEquations, .check = CheckEquations},
+    DocumentKind{.name = "model", .is = IsModel, .check = CheckModel, .set_up = true},
     DocumentKind{.name = "model", .is = IsAny, .check = CheckModel},
 };
 

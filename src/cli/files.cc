@@ -155,4 +155,10 @@ int WriteWholeFile(const std::string& path, const std::string& content,
   return trouble.empty() ? 0 : NotWritten(trouble, "");
 }
 
+std::optional<std::string> FindModelOrRefuse(const std::string& model) {
+  auto file = FindModel(model, ".");
+  if (!file) (void)Refuse(fmt::format("there is no model '{}'", model), ModelHint(model, "."));
+  return file;
+}
+
 }  // namespace mbv

@@ -52,6 +52,9 @@ struct LoadOptions;
 /// text that begins otherwise, so that mbverify did not write it. "" if it may.
 [[nodiscard]] std::string WhyForeign(const std::string& path, const std::string& content);
 
+/// The file of a model's name; empty after the message that there is none.
+[[nodiscard]] std::optional<std::string> FindModelOrRefuse(const std::string& model);
+
 /// Writes a file whole or not at all (see WriteFile in base/files.h), but not over one of `inputs`
 /// or over what mbverify did not write. Exit code: 0; after an error message 2 where `path` is
 /// refused, 3 where it cannot be written.

@@ -154,8 +154,6 @@ class Equations {
   [[nodiscard]] virtual EquationResult<std::vector<std::vector<double>>> EvaluateEdited(
       const std::string& text, size_t equation, const std::vector<ArgumentRow>& rows,
       bool corrected) = 0;
-  /// Whether a file of this kind runs as a program: then `command` is what runs.
-  [[nodiscard]] virtual std::vector<std::string> Command() const { return {}; }
 
   /// To be held by who calls while other threads may.
   [[nodiscard]] std::mutex& mutex() { return mutex_; }

@@ -284,8 +284,6 @@ class ProgramEquations final : public Equations {
     return result;
   }
 
-  std::vector<std::string> Command() const override { return EquationCommand(file_); }
-
  private:
   EquationResult<std::vector<std::vector<double>>> AskRows(Json call,
                                                            const std::vector<ArgumentRow>& rows) {

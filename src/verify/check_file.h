@@ -20,6 +20,7 @@ struct DocumentKind {
   Diagnostics (*check)(const std::string& file);
   const char* command = "";  ///< of the program that runs it
   bool in_time = false;      ///< a scenario with a motion: it has steps, and a model to perturb
+  bool set_up = false;       ///< a mechanism without a scenario: a first motion runs it
   RunOutcome (*run)(const std::string& file, const RunOptions& options) = nullptr;
   /// The mechanism as it runs; empty after findings.
   std::optional<Mechanism> (*mechanism)(const std::string& file, const ScenarioOptions& options,

@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "model_file/load_model.h"
 #include "reference/reference.h"
+#include "tests/support/crank_equations.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_folder.h"
 
@@ -33,26 +34,7 @@ Motion Turning() {
   return motion;
 }
 
-const char* const kPython = R"(
-from mbverify.equations import closed_form, output, motion, jacobian, asin, sin, cos, Vec
-
-def points(p, theta):
-    phi = -asin(p.r / p.l * sin(theta))
-    pin = p.r * Vec(cos(theta), sin(theta))
-    return [pin / 2, pin + p.l / 2 * Vec(cos(phi), sin(phi)), p.r * cos(theta) + p.l * cos(phi),
-            theta, phi]
-
-@closed_form("planar_slider_crank", commands=["motor"])
-def drives(p, theta):
-    return [theta]
-
-@closed_form.forces
-def forces(p, q, qd, qdd):
-    f = lambda theta: points(p, theta)
-    (crank, rod, slider, theta, phi) = motion(f, q, qd, qdd)[2]
-    weights = [p.m_crank] * 2 + [p.m_rod] * 2 + [p.m_slider, p.I_crank, p.I_rod]
-    a = [crank[0], crank[1] + p.g, rod[0], rod[1] + p.g, slider, theta, phi]
-    return [sum(w * x * J[0] for w, x, J in zip(weights, a, jacobian(f, q)))]
+const std::string kPython = test::kCrankEquations + R"(    return [torque]
 
 @output("slider.x", "m")
 def slider(p, theta):
@@ -191,15 +173,14 @@ TEST(FileForm, IsNotAppliedToOtherCommandsAndLoads) {
 
 TEST(FileForm, WarnsOfRatesThatAreNotDerivatives) {
   const std::string right =
-      std::string(kPython) + "\n@closed_form.rates\ndef rates(p, q, qd): return [qd.theta]\n";
+      kPython + "\n@closed_form.rates\ndef rates(p, q, qd): return [qd.theta]\n";
   EXPECT_TRUE(Make("crank.py", right).diagnostics.empty());
   const Made wrong = Make("crank.py", Replaced(right, "[qd.theta]", "[1.000001 * qd.theta]"));
   ASSERT_EQ(wrong.diagnostics.findings().size(), 1u);
   EXPECT_EQ(wrong.diagnostics.findings()[0].severity, Severity::kWarning);
   EXPECT_NE(wrong.diagnostics.findings()[0].message.find("its rates are not the derivatives"),
             std::string::npos);
-  const std::string jacobian =
-      std::string(kPython) + "\n@closed_form.jacobian\ndef J(p, theta): return [[2]]\n";
+  const std::string jacobian = kPython + "\n@closed_form.jacobian\ndef J(p, theta): return [[2]]\n";
   EXPECT_EQ(Make("crank.py", jacobian).diagnostics.findings().size(), 1u);
 }
 
@@ -265,7 +246,8 @@ TEST(FileForm, TellsWhereItHasNoPose) {
   for (Parameter& parameter : longer.parameters) {
     if (parameter.name == "r") parameter.value = 0.14;
   }
-  for (const auto& [name, text] : {std::pair{"crank.py", kPython}, {"crank.yaml", kFormulas}}) {
+  for (const auto& [name, text] :
+       {std::pair{"crank.py", kPython.c_str()}, {"crank.yaml", kFormulas}}) {
     const test::TestFolder folder("file_form");
     const std::string file =
         folder.Write(name, name == std::string("crank.yaml")

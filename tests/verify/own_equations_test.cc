@@ -10,6 +10,7 @@
 #include "base/files.h"
 #include "base/worker_pool.h"
 #include "features/run/run_scenario.h"
+#include "tests/support/crank_equations.h"
 #include "tests/support/run_program.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_folder.h"
@@ -38,30 +39,8 @@ class OwnEquations : public testing::Test {
   ~OwnEquations() override { unsetenv("XDG_CONFIG_HOME"); }
 
   std::string Write(const std::string& forces, const std::string& name = "crank.py") const {
-    folder_.Write(name, fmt::format(R"(
-from mbverify.equations import closed_form, motion, jacobian, asin, sin, cos, Vec
-open("{}", "w").write("ran")
-
-def points(p, theta):
-    phi = -asin(p.r / p.l * sin(theta))
-    pin = p.r * Vec(cos(theta), sin(theta))
-    return [pin / 2, pin + p.l / 2 * Vec(cos(phi), sin(phi)), p.r * cos(theta) + p.l * cos(phi),
-            theta, phi]
-
-@closed_form("planar_slider_crank", commands=["motor"])
-def drives(p, theta):
-    return [theta]
-
-@closed_form.forces
-def forces(p, q, qd, qdd):
-    f = lambda theta: points(p, theta)
-    crank, rod, slider, theta, phi = motion(f, q, qd, qdd)[2]
-    weights = [p.m_crank] * 2 + [p.m_rod] * 2 + [p.m_slider, p.I_crank, p.I_rod]
-    a = [crank[0], crank[1] + p.g, rod[0], rod[1] + p.g, slider, theta, phi]
-    torque = sum(w * x * J[0] for w, x, J in zip(weights, a, jacobian(f, q)))
-    {}
-)",
-                                    Marker(), forces));
+    folder_.Write(name, fmt::format("open(\"{}\", \"w\").write(\"ran\")\n", Marker()) +
+                            test::kCrankEquations + "    " + forces + "\n");
     return folder_.Write(
         "turn.yaml",
         fmt::format(R"(

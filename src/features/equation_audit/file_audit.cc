@@ -32,6 +32,7 @@ constexpr double kNudge = 1e-3;           // of arguments, to see what an equati
 constexpr double kVanishes = 1e-9;        // of the size of the terms
 constexpr double kDefaultRange_m = 0.05;  // of the mechanism's size
 constexpr double kDefaultRange_rad = 0.2;
+constexpr const char* kOfVelocities = "the share of the velocities (Coriolis and centrifugal)";
 constexpr double kRatesPerRange = 2.0, kAccelerationsPerRange = 8.0;  // [1/s, 1/s²]
 
 std::string ShortName(const std::string& name) {
@@ -377,10 +378,15 @@ class FileAudit {
 
   // Rows of one equation: arguments and truth at all states, of all indices.
   struct Case {
+    // Of one combination of indices: what it gives, and what its arguments are.
+    struct Part {
+      AuditQuantity gives;
+      std::vector<std::pair<std::string, AuditQuantity>> arguments;
+    };
+    std::vector<Part> parts;
     std::vector<ArgumentRow> rows;
     AuditValues truth;
     int columns = 0;
-    std::vector<KnownTerm> terms;
     bool vanishes = false;
   };
 
@@ -414,13 +420,11 @@ class FileAudit {
         }
         const Argument truth = gives->At(states_[k]);
         made.columns = truth.columns;
-        AddTerms(Filled(equation.gives, indices), *gives, k, truth, arguments, &made);
         made.truth.push_back(truth.values);
         made.rows.push_back(std::move(row));
       }
+      made.parts.push_back({*gives, std::move(arguments)});
     }
-    std::erase_if(made.terms,
-                  [&](const KnownTerm& term) { return term.values.size() != made.truth.size(); });
     return made;
   }
 
@@ -434,70 +438,75 @@ class FileAudit {
     }
   }
 
-  static void AddTerm(const std::string& name, std::vector<double> values, Case* made) {
-    const auto known = std::ranges::find(made->terms, name, &KnownTerm::name);
-    KnownTerm& term =
-        known != made->terms.end() ? *known : made->terms.emplace_back(KnownTerm{name, {}});
+  using Terms = std::vector<KnownTerm>;
+  static void AddTerm(const std::string& name, std::vector<double> values, Terms* terms) {
+    const auto known = std::ranges::find(*terms, name, &KnownTerm::name);
+    KnownTerm& term = known != terms->end() ? *known : terms->emplace_back(KnownTerm{name, {}});
     term.values.push_back(std::move(values));
   }
 
-  // Terms that may be missing: shares of the quantity itself, vectors that are given and products
-  // of two of them.
-  void AddTerms(const std::string& gives, const AuditQuantity& quantity, size_t k,
-                const Argument& truth,
-                const std::vector<std::pair<std::string, AuditQuantity>>& arguments, Case* made) {
-    const Shares& shares = shares_[k];
-    for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
-      if (gives != mechanism_.drives[d].name + ".force") continue;
-      const auto i = static_cast<Eigen::Index>(d);
-      AddTerm("the share of the weight", {shares.gravity[i]}, made);
-      AddTerm("the share of the velocities (Coriolis and centrifugal)", {shares.velocity[i]}, made);
-      AddTerm("the share of the accelerations", {shares.inertia[i]}, made);
-      if (!loads_.empty()) AddTerm("the share of the loads", {shares.loads[i]}, made);
+  // Terms that may be missing, at all states.
+  Terms TermsOf(const Case& made) {
+    Terms terms;
+    for (const Case::Part& part : made.parts) {
+      for (size_t k = 0; k < states_.size(); ++k) AddTerms(part, k, &terms);
     }
-    // An acceleration's part that is there without any of the coordinates'.
-    const Argument slow = quantity.At(slow_[k]);
-    if (gives.find("acceleration") != std::string::npos) {
-      AddTerm("the part of the velocities (J̇ q̇)", slow.values, made);
+    std::erase_if(terms,
+                  [&](const KnownTerm& term) { return term.values.size() != made.truth.size(); });
+    return terms;
+  }
+
+  // Shares of the quantity itself, vectors that are given and products of two of them.
+  void AddTerms(const Case::Part& part, size_t k, Terms* terms) {
+    if (const int drive = part.gives.drive_of_force(); drive >= 0) {
+      const Shares& shares = shares_[k];
+      AddTerm("the share of the weight", {shares.gravity[drive]}, terms);
+      AddTerm(kOfVelocities, {shares.velocity[drive]}, terms);
+      AddTerm("the share of the accelerations", {shares.inertia[drive]}, terms);
+      if (!loads_.empty()) AddTerm("the share of the loads", {shares.loads[drive]}, terms);
     }
-    const size_t size = truth.values.size();
+    if (part.gives.is_acceleration()) {
+      AddTerm("the part of the velocities (J̇ q̇)", part.gives.At(slow_[k]).values, terms);
+    }
+    const size_t size = part.gives.At(states_[k]).values.size();
     std::vector<std::pair<std::string, Vec3>> vectors;
-    for (const auto& [name, given] : arguments) {
+    for (const auto& [name, given] : part.arguments) {
       const Argument value = given.At(states_[k]);
-      if (value.values.size() == size) AddTerm(name, value.values, made);
+      if (value.values.size() == size) AddTerm(name, value.values, terms);
       if (value.columns == 0 && value.rows == 3) {
         vectors.emplace_back(name, Vec3(value.values.data()));
       }
     }
-    AddParameterTerms(k, size, arguments, made);
+    AddParameterTerms(k, size, part.arguments, terms);
     if (size != 3) return;
     for (size_t i = 0; i < vectors.size(); ++i) {
       for (size_t j = 0; j < vectors.size(); ++j) {
         const auto& [a, x] = vectors[i];
         const auto& [b, y] = vectors[j];
-        if (i < j) AddVector(fmt::format("{} × {}", a, b), x.cross(y), made);
-        if (i != j) AddVector(fmt::format("{} × ({} × {})", a, a, b), x.cross(x.cross(y)), made);
-        AddVector(fmt::format("({}·{}) {}", a, b, a), x.dot(y) * x, made);
+        if (i < j) AddVector(fmt::format("{} × {}", a, b), x.cross(y), terms);
+        if (i != j) AddVector(fmt::format("{} × ({} × {})", a, a, b), x.cross(x.cross(y)), terms);
+        AddVector(fmt::format("({}·{}) {}", a, b, a), x.dot(y) * x, terms);
       }
     }
   }
+
   // A parameter, and a parameter times what is given.
   void AddParameterTerms(size_t k, size_t size,
                          const std::vector<std::pair<std::string, AuditQuantity>>& arguments,
-                         Case* made) {
+                         Terms* terms) {
     for (const Parameter& parameter : mechanism_.parameters) {
       if (parameter.value == 0.0 || parameter.value == 1.0) continue;
-      if (size == 1) AddTerm(parameter.name, {parameter.value}, made);
+      if (size == 1) AddTerm(parameter.name, {parameter.value}, terms);
       for (const auto& [name, given] : arguments) {
         std::vector<double> values = given.At(states_[k]).values;
         if (values.size() != size) continue;
         for (double& value : values) value *= parameter.value;
-        AddTerm(fmt::format("{} {}", parameter.name, name), std::move(values), made);
+        AddTerm(fmt::format("{} {}", parameter.name, name), std::move(values), terms);
       }
     }
   }
-  static void AddVector(const std::string& name, const Vec3& value, Case* made) {
-    AddTerm(name, {value[0], value[1], value[2]}, made);
+  static void AddVector(const std::string& name, const Vec3& value, Terms* terms) {
+    AddTerm(name, {value[0], value[1], value[2]}, terms);
   }
 
   std::optional<AuditRow> Audit(size_t index) {
@@ -528,7 +537,8 @@ class FileAudit {
       (void)Refused(printed.failure);
       return {};
     }
-    double terms = SizeOfTerms(index, *made, corrected.has_value());
+    double terms =
+        SizeOfTerms(index, *made, corrected ? *corrected : *printed.value, corrected.has_value());
     if (made->vanishes) {
       terms = std::max(terms, SizeBySigns(index, *made, corrected.has_value()));
     }
@@ -561,7 +571,7 @@ class FileAudit {
 
   // How large the terms are of which the equation is made: by how much it changes with its
   // arguments. 0 where it depends on none; NaN where that cannot be seen.
-  double SizeOfTerms(size_t index, const Case& made, bool corrected) {
+  double SizeOfTerms(size_t index, const Case& made, const AuditValues& at, bool corrected) {
     std::mt19937_64 random(kSeed + 1);
     const auto draw = [&] { return 2.0 * (static_cast<double>(random() >> 11) * 0x1p-53) - 1.0; };
     std::map<std::string, double> sizes;
@@ -580,13 +590,12 @@ class FileAudit {
         for (double& value : argument.values) value += kNudge * sizes[name] * draw();
       }
     }
-    const auto at = equations_->Evaluate(index, made.rows, corrected);
     const auto beside = equations_->Evaluate(index, nudged, corrected);
-    if (!at || !beside) return kNan;
+    if (!beside) return kNan;
     double largest = 0.0;
     for (size_t k = 0; k < nudged.size(); ++k) {
-      for (size_t i = 0; i < (*at.value)[k].size(); ++i) {
-        const double change = std::abs((*beside.value)[k][i] - (*at.value)[k][i]);
+      for (size_t i = 0; i < at[k].size(); ++i) {
+        const double change = std::abs((*beside.value)[k][i] - at[k][i]);
         if (change > largest) largest = change;
       }
     }
@@ -667,7 +676,7 @@ class FileAudit {
     SlipSearch search{.printed = printed, .truth = made.truth};
     search.limit = row->limit;
     search.columns = made.columns;
-    search.terms = made.terms;
+    search.terms = TermsOf(made);
     search.text = text_;
     search.line = equation.line;
     search.end = equation.end;
@@ -753,30 +762,19 @@ class FileAudit {
       if (sample) values = sample.value->forces;
       if (!sample) values.assign(drives.size(), kNan);
       if (sample && !forces) values.clear();
-      for (size_t d = 0; d < drives.size(); ++d) {
-        if (sample && !forces) values.push_back(sample.value->drives[d].value);
-        const AuditState& state = states_[k];
-        truth.push_back(
-            forces ? state.drive_force[static_cast<Eigen::Index>(d)]
-                   : AuditQuantity::OfCoordinate({Coordinate::Kind::kDrive, static_cast<int>(d), 0})
-                         .At(state)
-                         .values.front());
+      for (size_t d = 0; sample && !forces && d < drives.size(); ++d) {
+        values.push_back(sample.value->drives[d].value);
       }
+      const VecX right = forces ? states_[k].drive_force : DriveValues(states_[k], 0);
+      truth.assign(right.begin(), right.end());
       given.push_back(std::move(values));
       made.truth.push_back(std::move(truth));
-      if (forces) {
-        AddShare("the share of the weight", shares_[k].gravity, &made);
-        AddShare("the share of the velocities (Coriolis and centrifugal)", shares_[k].velocity,
-                 &made);
-        AddShare("the share of the accelerations", shares_[k].inertia, &made);
-        AddDriveTerms(k, &made);
-      }
     }
     Judge({}, made, &given, nullptr, kNan, &row);
     if (options_.search && search && row.verdict != AuditVerdict::kOk) {
       SlipSearch slips{.printed = given, .truth = made.truth};
       slips.limit = row.limit;
-      slips.terms = made.terms;
+      if (forces) slips.terms = TermsOfForces();
       slips.text = text_;
       slips.line = 1;
       slips.end = 1 + static_cast<int>(std::ranges::count(text_, '\n'));
@@ -800,29 +798,36 @@ class FileAudit {
     return right;
   }
 
-  // A parameter times the drives' rates or accelerations: a damper, a rotor.
-  void AddDriveTerms(size_t k, Case* made) {
-    for (const char* what : {"rate", "acceleration"}) {
-      std::vector<double> motion;
-      for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
-        const Drive& drive = mechanism_.drives[d];
-        std::string reason, hint;
-        const auto quantity =
-            AuditQuantity::Parse(drive.name + (*what == 'r' ? ".velocity" : ".acceleration"),
-                                 mechanism_, &reason, &hint);
-        motion.push_back(quantity ? quantity->At(states_[k]).values.front() : kNan);
-      }
+  // Of all drives' forces: their shares, and a parameter times rates or accelerations (a damper, a
+  // rotor).
+  Terms TermsOfForces() {
+    Terms terms;
+    for (size_t k = 0; k < states_.size(); ++k) {
+      const Shares& shares = shares_[k];
+      const auto add = [&](const std::string& name, const VecX& values, double factor = 1.0) {
+        const VecX scaled = factor * values;
+        AddTerm(name, {scaled.begin(), scaled.end()}, &terms);
+      };
+      add("the share of the weight", shares.gravity);
+      add(kOfVelocities, shares.velocity);
+      add("the share of the accelerations", shares.inertia);
+      const VecX rates = DriveValues(states_[k], 1), accelerations = DriveValues(states_[k], 2);
       for (const Parameter& parameter : mechanism_.parameters) {
-        std::vector<double> values = motion;
-        for (double& value : values) value *= parameter.value;
-        AddTerm(fmt::format("{} times each drive's {}", parameter.name, what), std::move(values),
-                made);
+        add(parameter.name + " times each drive's rate", rates, parameter.value);
+        add(parameter.name + " times each drive's acceleration", accelerations, parameter.value);
       }
     }
+    return terms;
   }
 
-  static void AddShare(const std::string& name, const VecX& values, Case* made) {
-    AddTerm(name, {values.begin(), values.end()}, made);
+  // Positions, rates or accelerations of all drives.
+  [[nodiscard]] VecX DriveValues(const AuditState& state, int order) const {
+    VecX values(static_cast<Eigen::Index>(mechanism_.drives.size()));
+    for (Eigen::Index d = 0; d < values.size(); ++d) {
+      const Coordinate drive{Coordinate::Kind::kDrive, static_cast<int>(d), 0};
+      values[d] = AuditQuantity::OfCoordinate(drive, order).At(state).values.front();
+    }
+    return values;
   }
 
   struct Shares {

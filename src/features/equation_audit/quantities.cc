@@ -250,10 +250,11 @@ std::optional<AuditQuantity> AuditQuantity::Parse(const std::string& text,
   return QuantityParser(text, mechanism, reason, hint).Run();
 }
 
-AuditQuantity AuditQuantity::OfCoordinate(const Coordinate& coordinate) {
+AuditQuantity AuditQuantity::OfCoordinate(const Coordinate& coordinate, int order) {
   AuditQuantity quantity;
   quantity.kind_ = Kind::kCoordinate;
   quantity.coordinate_ = coordinate;
+  quantity.order_ = order;
   return quantity;
 }
 

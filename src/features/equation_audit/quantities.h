@@ -31,8 +31,15 @@ class AuditQuantity {
   [[nodiscard]] static std::optional<AuditQuantity> Parse(const std::string& text,
                                                           const Mechanism& mechanism,
                                                           std::string* reason, std::string* hint);
-  [[nodiscard]] static AuditQuantity OfCoordinate(const Coordinate& coordinate);
+  /// `order`: 0 its value, 1 its rate, 2 its acceleration.
+  [[nodiscard]] static AuditQuantity OfCoordinate(const Coordinate& coordinate, int order);
   [[nodiscard]] Argument At(const AuditState& state) const;
+  /// The drive whose force it is, by index; −1: none.
+  [[nodiscard]] int drive_of_force() const { return kind_ == Kind::kDriveForce ? index_ : -1; }
+  [[nodiscard]] bool is_acceleration() const {
+    return (kind_ == Kind::kCoordinate && order_ == 2) ||
+           (kind_ == Kind::kBody && (of_ == Of::kAcceleration || of_ == Of::kAngularAcceleration));
+  }
   /// The equation is an identity that must vanish.
   [[nodiscard]] bool vanishes() const { return kind_ == Kind::kZero; }
 

@@ -11,6 +11,7 @@
 #include "base/json_text.h"
 #include "base/text.h"
 #include "cli/cli.h"
+#include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "model_file/mesh/inertia_diagnosis.h"
@@ -146,11 +147,8 @@ struct InertiaArguments {
 };
 
 int Inertia(const InertiaArguments& arguments) {
-  const auto file = FindModel(arguments.model, ".");
-  if (!file) {
-    return Refuse(fmt::format("there is no model '{}'", arguments.model),
-                  ModelHint(arguments.model, "."));
-  }
+  const auto file = FindModelOrRefuse(arguments.model);
+  if (!file) return 2;
   const InputWatch inputs;
   const InertiaCheck check = CheckInertia(*file);
   SayText(stderr, check.diagnostics.Text());

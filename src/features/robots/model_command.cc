@@ -86,11 +86,8 @@ int Model(const ModelArguments& arguments) {
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
   if (!ReadRobotOptions(arguments.robot, &options)) return 2;
-  const auto file = FindModel(arguments.model, ".");
-  if (!file) {
-    return Refuse(fmt::format("there is no model '{}'", arguments.model),
-                  ModelHint(arguments.model, "."));
-  }
+  const auto file = FindModelOrRefuse(arguments.model);
+  if (!file) return 2;
   if (arguments.robot.any() && !IsRobotFile(*file)) {
     return RefuseRobotOptions();
   }

@@ -20,6 +20,7 @@
 #include "features/run/run_scenario.h"
 #include "mechanism/channels.h"
 #include "report/report.h"
+#include "verify/check_file.h"
 #include "verify/model_text.h"
 #include "verify/trace_data.h"
 
@@ -130,14 +131,6 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   return true;
 }
 
-// A model file, which has no motion of its own.
-bool IsModelFile(const std::string& file) {
-  const ScenarioHead head = ReadScenarioHead(file);
-  return !head.is_scenario && head.HasKey("name") &&
-         (head.HasKey("bodies") || head.HasKey("parts") || head.HasKey("legs") ||
-          head.HasKey("urdf"));
-}
-
 // A robot's file, or a model, is run by a first motion; its model and scenario are left to go on
 // from.
 bool SetUpRobot(const std::string& robot, const RunArguments& arguments, FindingPrinter* findings,
@@ -204,7 +197,7 @@ int Run(const RunArguments& arguments) {
     const bool floats = arguments.robot.free_base || !arguments.robot.plants.empty();
     options.source_model =
         given.ends_with(".xml") && !arguments.no_source_model && !floats ? given : "";
-    if ((IsRobotFile(given) || IsModelFile(given)) &&
+    if ((IsRobotFile(given) || KindOf(given).set_up) &&
         !SetUpRobot(given, arguments, &findings, &file)) {
       exit_code = WorseExit(exit_code, 2);
       counts += RunCounts{.scenarios = 1, .bad_input = 1};

@@ -69,11 +69,8 @@ bool ReadRange(const std::string& text, const Mechanism& mechanism,
 }
 
 int Standin(const StandinArguments& arguments) {
-  const auto file = FindModel(arguments.model, ".");
-  if (!file) {
-    return Refuse(fmt::format("there is no model '{}'", arguments.model),
-                  ModelHint(arguments.model, "."));
-  }
+  const auto file = FindModelOrRefuse(arguments.model);
+  if (!file) return 2;
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
   if (!IsRobotFile(*file) && arguments.options.any()) return RefuseRobotOptions();

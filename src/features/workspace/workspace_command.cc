@@ -38,11 +38,8 @@ nlohmann::ordered_json OutcomeJson(const std::string& mechanism, const Workspace
 }
 
 int Workspace(const WorkspaceArguments& arguments) {
-  const auto file = FindModel(arguments.model, ".");
-  if (!file) {
-    return Refuse(fmt::format("there is no model '{}'", arguments.model),
-                  ModelHint(arguments.model, "."));
-  }
+  const auto file = FindModelOrRefuse(arguments.model);
+  if (!file) return 2;
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
   const LoadResult loaded = LoadModel(*file, options);
