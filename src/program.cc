@@ -16,7 +16,8 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddConvergeCommand,
     AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
     AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
-    AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand;
+    AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand,
+    AddCodeCommand;
 
 namespace {
 
@@ -47,6 +48,7 @@ constexpr std::array kCommands = {
     CommandRow{AddSizeCommand, kRobots},
     CommandRow{AddLogCommand, kRobots, true},
     CommandRow{AddStandinCommand, kRobots, true},
+    CommandRow{AddCodeCommand, kRobots},
     CommandRow{AddCrosscheckCommand, kEngines},
     CommandRow{AddRenderCommand, kPublish, true},
     CommandRow{AddFiguresCommand, kPublish},

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 
 #include "base/files.h"
 #include "base/text.h"
 #include "cli/cli.h"
 #include "cli/terminal.h"
+#include "model_file/yaml/units.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
 #include "verify/check_file.h"
@@ -153,6 +155,40 @@ int WriteWholeFile(const std::string& path, const std::string& content,
   if (!why.empty()) return Refuse(why, "");
   const std::string trouble = WriteFile(path, content);
   return trouble.empty() ? 0 : NotWritten(trouble, "");
+}
+
+std::optional<NamedRange> ReadNamedRange(
+    const std::string& text, const std::vector<std::string>& names,
+    const std::function<std::string(const std::string&)>& unit_of) {
+  const auto refuse = [](const std::string& message, const std::string& hint) {
+    (void)Refuse(message, hint);
+    return std::nullopt;
+  };
+  const char* instance = "for instance pitch_deg=-50:30";
+  const auto assigned = SplitSet(text);
+  const size_t colon = assigned ? assigned->second.find(':') : std::string::npos;
+  if (colon == std::string::npos) {
+    return refuse("--range " + text + " is not NAME=LOW:HIGH", instance);
+  }
+  const NameInUnit named =
+      SplitUnit(assigned->first, [&](const std::string& name) { return Contains(names, name); });
+  const auto number = [&](const std::string& word) {
+    char* end = nullptr;
+    const double value = std::strtod(word.c_str(), &end);
+    return word.empty() || *end != '\0' || !std::isfinite(value) ? kNan : named.unit.to_si(value);
+  };
+  NamedRange range{.name = named.name,
+                   .low = number(assigned->second.substr(0, colon)),
+                   .high = number(assigned->second.substr(colon + 1))};
+  if (std::isnan(range.low) || std::isnan(range.high)) {
+    return refuse("--range " + text + ": two numbers are needed", instance);
+  }
+  const std::string unit = Contains(names, range.name) ? unit_of(range.name) : "";
+  if (!unit.empty() && !named.unit.Suits(unit)) {
+    return refuse("--range " + text + ": the coordinate is in " + unit,
+                  unit == "rad" ? "NAME=… in rad or NAME_deg=…" : "NAME=… in m or NAME_mm=…");
+  }
+  return range;
 }
 
 std::optional<std::string> FindModelOrRefuse(const std::string& model) {

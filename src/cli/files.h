@@ -1,6 +1,7 @@
 // Files named on the command line.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -54,6 +55,17 @@ struct LoadOptions;
 
 /// The file of a model's name; empty after the message that there is none.
 [[nodiscard]] std::optional<std::string> FindModelOrRefuse(const std::string& model);
+
+/// Of a coordinate [rad or m].
+struct NamedRange {
+  std::string name;
+  double low = 0.0, high = 0.0;
+};
+/// "pitch_deg=-50:30", where `names` are known and `unit_of` says "m" or "rad"; empty after a
+/// message. A name that is not known is taken as it is.
+[[nodiscard]] std::optional<NamedRange> ReadNamedRange(
+    const std::string& text, const std::vector<std::string>& names,
+    const std::function<std::string(const std::string&)>& unit_of);
 
 /// Writes a file whole or not at all (see WriteFile in base/files.h), but not over one of `inputs`
 /// or over what mbverify did not write. Exit code: 0; after an error message 2 where `path` is

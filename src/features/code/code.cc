@@ -1,0 +1,395 @@
+#include "features/code/code.h"
+
+#include <fmt/format.h>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "base/files.h"
+#include "base/scratch_folder.h"
+#include "base/sha256.h"
+#include "base/text.h"
+#include "base/worker_pool.h"
+#include "features/code/code_check.h"
+#include "features/code/start_table.h"
+#include "kinematics/command_rank.h"
+#include "mechanism/reach.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kTests = 5;  // in the files
+constexpr size_t kPythonStates = 300;
+constexpr int kHalvings = 6;  // of the states' spread
+constexpr double kLeastReached = 0.7;
+constexpr size_t kNamed = 12;
+
+std::string CName(const std::string& text) {
+  std::string name;
+  for (const char c : text) {
+    name += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  }
+  if (name.empty() || std::isdigit(static_cast<unsigned char>(name[0])) != 0) name = "m_" + name;
+  return name;
+}
+
+// How far coordinates are moved to either side of home.
+struct Spread {
+  VecX low, high;
+};
+
+class CodeMaker {
+ public:
+  CodeMaker(const Mechanism& mechanism, const CodeTask& task, const CodeSettings& settings,
+            const std::function<void(double)>& progress)
+      : m_(mechanism), task_(task), settings_(settings), progress_(progress) {}
+
+  CodeResult Make() {
+    result_.name = settings_.name.empty() ? CName(m_.name) : CName(settings_.name);
+    result_.coordinates = NamesOf(task_.coordinates);
+    result_.actuators = NamesOf(task_.actuators);
+    formulas_ =
+        MakeFormulas(m_, task_.coordinates, task_.held, task_.actuators, &result_.diagnostics);
+    if (!formulas_) return std::move(result_);
+    for (const ClosureBlock& block : formulas_->closure.blocks) {
+      ++result_.blocks;
+      result_.unknowns += block.rates.size();
+      result_.largest_block = std::max(result_.largest_block, block.rates.size());
+    }
+    AddNotes();
+    if (!FindSpread() || !FindStates()) return std::move(result_);
+    options_.name = result_.name;
+    options_.tolerance = CodeClosureTolerance(*formulas_);
+    for (size_t i = 0; i < std::min(kTests, states_.size()); ++i)
+      options_.tests.push_back(states_[i]);
+    if (!settings_.ranges.empty() && !MakeTable()) return std::move(result_);
+    Head();
+    const std::string header = CHeader(*formulas_, options_);
+    const std::string python = PythonModule(*formulas_, options_);
+    result_.files = {{result_.name + ".h", header},
+                     {result_.name + ".py", python},
+                     {result_.name + "_test.c", CheckProgram(*formulas_, options_)}};
+    if (settings_.compile) Judge(header, python);
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] double UnitOf(size_t k) const {
+    return IsLength(m_, task_.coordinates[k].coordinate) ? formulas_->length : 1.0;
+  }
+  void Report(double share) const {
+    if (progress_) progress_(share);
+  }
+
+  void AddNotes() {
+    if (!formulas_->no_forces.empty()) {
+      result_.notes.push_back("no forces: " + formulas_->no_forces);
+    } else if (task_.actuators.size() != task_.coordinates.size()) {
+      result_.notes.push_back(fmt::format(
+          "no forces of actuators: {} for {} coordinates; forces along the coordinates are given",
+          task_.actuators.size(), task_.coordinates.size()));
+    }
+    if (!task_.held.empty()) {
+      result_.notes.push_back("held at home: " + Joined(NamesOf(task_.held), kNamed));
+    }
+    if (!formulas_->from_actuators) {
+      result_.notes.emplace_back(
+          "no way back from actuators to coordinates: they alone do not hold it at home");
+    }
+  }
+
+  // Ranges as stated, else 0.3 rad or 0.2 L to either side of home, within what the model allows.
+  bool FindSpread() {
+    const auto n = static_cast<Eigen::Index>(formulas_->size());
+    spread_.low.resize(n);
+    spread_.high.resize(n);
+    for (size_t k = 0; k < formulas_->size(); ++k) {
+      const Coordinate& at = task_.coordinates[k].coordinate;
+      const double home = formulas_->closure.home[static_cast<Eigen::Index>(k)];
+      const double to = IsLength(m_, at) ? 0.2 * formulas_->length : 0.3;
+      CoordinateRange range = RangeOf(at);
+      range.lower = std::max(range.lower, home - to);
+      range.upper = std::min(range.upper, home + to);
+      spread_.low[static_cast<Eigen::Index>(k)] = std::min(range.lower, home);
+      spread_.high[static_cast<Eigen::Index>(k)] = std::max(range.upper, home);
+    }
+    if (settings_.ranges.empty()) return true;
+    for (const CodeRange& range : settings_.ranges) {
+      const auto at =
+          std::ranges::find(task_.coordinates, range.coordinate, &NamedCoordinate::name);
+      if (at == task_.coordinates.end()) {
+        result_.diagnostics.AddError(
+            m_.file, "a range is stated of '" + range.coordinate + "', which is no coordinate",
+            DidYouMean(range.coordinate, result_.coordinates,
+                       "the coordinates: " + Joined(result_.coordinates, kNamed)));
+        return false;
+      }
+      if (!(range.low < range.high)) {
+        result_.diagnostics.AddError(m_.file, "the range of '" + range.coordinate + "' is empty",
+                                     "LOW:HIGH with LOW < HIGH");
+        return false;
+      }
+      const auto k = at - task_.coordinates.begin();
+      spread_.low[k] = range.low;
+      spread_.high[k] = range.high;
+    }
+    if (settings_.ranges.size() == formulas_->size()) return true;
+    result_.diagnostics.AddError(m_.file,
+                                 fmt::format("ranges of {} of {} coordinates: a table needs all",
+                                             settings_.ranges.size(), formulas_->size()),
+                                 "--range of each of: " + Joined(result_.coordinates, kNamed));
+    return false;
+  }
+
+  [[nodiscard]] CoordinateRange RangeOf(const Coordinate& at) const {
+    const auto index = static_cast<size_t>(at.index);
+    switch (at.kind) {
+      case Coordinate::Kind::kDrive:
+        return m_.drives[index].range;
+      case Coordinate::Kind::kPrescribed:
+        return m_.joints[static_cast<size_t>(m_.prescribed[index].joint)].range[0];
+      case Coordinate::Kind::kJoint:
+        return m_.joints[index].range[static_cast<size_t>(at.component)];
+      case Coordinate::Kind::kOutput:
+        break;
+    }
+    return {};
+  }
+
+  // Random ones, and what the reference finds there, each from home; less far from home until most
+  // are reached.
+  bool FindStates() {
+    CodeReference reference(m_, task_);
+    std::string why;
+    for (int halving = 0; halving <= kHalvings; ++halving) {
+      std::mt19937_64 random(settings_.seed);  // the same each time
+      std::uniform_real_distribution<double> one(-1.0, 1.0);
+      states_.clear();
+      open_.clear();
+      const VecX& home = formulas_->closure.home;
+      const double share = std::pow(0.5, halving);
+      for (size_t i = 0; i < settings_.states; ++i) {
+        TestState state;
+        const auto n = static_cast<Eigen::Index>(formulas_->size());
+        state.q.resize(n), state.v.resize(n), state.a.resize(n);
+        for (Eigen::Index k = 0; k < n; ++k) {
+          const double unit = UnitOf(static_cast<size_t>(k)), at = 0.5 * (one(random) + 1.0);
+          const double q = spread_.low[k] + at * (spread_.high[k] - spread_.low[k]);
+          state.q[k] = home[k] + share * (q - home[k]);
+          state.v[k] = unit * one(random);
+          state.a[k] = 10.0 * unit * one(random);
+        }
+        if (reference.Find(&state, &why)) {
+          states_.push_back(std::move(state));
+        } else {
+          open_.push_back(std::move(state));
+        }
+        if (i % 64 == 0)
+          Report(0.4 * static_cast<double>(i) / static_cast<double>(settings_.states));
+        if (i > 200 && settings_.ranges.empty() && halving < kHalvings &&
+            static_cast<double>(states_.size()) < kLeastReached * static_cast<double>(i)) {
+          break;
+        }
+      }
+      const double reached =
+          static_cast<double>(states_.size()) / static_cast<double>(states_.size() + open_.size());
+      if (!settings_.ranges.empty() || reached >= kLeastReached) break;
+    }
+    if (states_.size() >= std::min<size_t>(kTests, settings_.states)) return true;
+    result_.diagnostics.AddError(m_.file, "the reference reaches no states near home: " + why,
+                                 "other coordinates, smaller ranges or another home pose");
+    return false;
+  }
+
+  bool MakeTable() {
+    std::string why;
+    options_.table = MakeStartTable(*formulas_, spread_.low, spread_.high, &why,
+                                    [this](double share) { Report(0.4 + 0.4 * share); });
+    if (!why.empty()) {
+      result_.diagnostics.AddError(m_.file, "no table that is proved: " + why,
+                                   "without ranges, code starts from the pose at hand");
+      return false;
+    }
+    size_t proved = 0;
+    for (const bool cell : options_.table->proved) proved += cell ? 1 : 0;
+    result_.table_bound = options_.table->bound;
+    result_.table_share =
+        static_cast<double>(proved) / static_cast<double>(options_.table->proved.size());
+    if (proved > 0) return true;
+    result_.diagnostics.AddError(m_.file, "nowhere in the ranges is the pose proved to be found",
+                                 "smaller ranges, without singular poses");
+    return false;
+  }
+
+  void Head() {
+    std::vector<std::string>& head = options_.heading;
+    head.push_back(
+        fmt::format("Inverse kinematics, Jacobian{} of {}, made by mbverify; do not edit.",
+                    formulas_->forces.empty() ? "" : " and inverse dynamics", m_.name));
+    if (!settings_.origin.empty()) head.push_back("Model: " + settings_.origin);
+    if (const std::optional<std::string> text = ReadWholeFile(m_.file)) {
+      head.push_back("sha256 of its file: " + Sha256Hex(*text));
+    }
+    head.emplace_back();
+    head.emplace_back("SI units and radians. Coordinates:");
+    for (size_t k = 0; k < formulas_->size(); ++k) {
+      head.push_back(fmt::format("  q[{}] {} [{}]", k, task_.coordinates[k].name,
+                                 CoordinateUnit(m_, task_.coordinates[k].coordinate)));
+    }
+    head.emplace_back("Actuators, forces positive towards a larger position:");
+    for (size_t k = 0; k < formulas_->actuators.size(); ++k) {
+      head.push_back(fmt::format("  {} {} [{}]", k, formulas_->actuators[k].name,
+                                 formulas_->actuators[k].unit));
+    }
+    for (const std::string& note : result_.notes) {
+      head.push_back(static_cast<char>(std::toupper(note[0])) + note.substr(1) + ".");
+    }
+    // Nothing in a name ends a comment or a docstring.
+    for (std::string& line : head) {
+      line = OneLine(line);
+      for (const char* end : {"*/", "\"\"\"", "\\"}) {
+        for (size_t at = line.find(end); at != std::string::npos; at = line.find(end)) {
+          line[at] = '_';
+        }
+      }
+    }
+  }
+
+  void Judge(const std::string& header, const std::string& python) {
+    CodeCheck check(*formulas_, options_, states_, open_);
+    std::string judged = header;
+    if (!settings_.check.empty()) {
+      const std::optional<std::string> text = ReadWholeFile(settings_.check);
+      if (!text) {
+        result_.diagnostics.AddError(settings_.check, "cannot be read",
+                                     "a header that `code` wrote");
+        return;
+      }
+      judged = *text;
+    }
+    result_.judgements.push_back(check.C(judged, false));
+    Report(0.9);
+    if (options_.table) result_.judgements.push_back(check.C(judged, true));
+    for (CodeJudgement& judgement : result_.judgements) {
+      if (judgement.not_judged.empty() && !judgement.agrees()) {
+        CodeReference reference(m_, task_);
+        judgement.slip = check.Slip(&reference);
+      }
+    }
+    if (settings_.check.empty()) {
+      result_.judgements.push_back(check.Python(python, kPythonStates));
+    }
+    Report(1.0);
+  }
+
+  const Mechanism& m_;
+  const CodeTask& task_;
+  const CodeSettings& settings_;
+  const std::function<void(double)>& progress_;
+  CodeResult result_;
+  std::unique_ptr<MechanismFormulas> formulas_;
+  CodeTextOptions options_;
+  Spread spread_;
+  std::vector<TestState> states_, open_;
+};
+
+}  // namespace
+
+bool CodeJudgement::agrees() const {
+  const auto within = [](double difference) {
+    return std::isnan(difference) || difference <= kLimit;
+  };
+  return not_judged.empty() && states > 0 && position <= kLimit && within(force) &&
+         within(jacobian) && static_cast<double>(only_one) <= 0.01 * static_cast<double>(states);
+}
+
+bool CodeResult::agrees() const {
+  return !diagnostics.has_errors() && std::ranges::all_of(judgements, [](const CodeJudgement& one) {
+    return !one.not_judged.empty() || one.agrees();
+  });
+}
+
+std::optional<CodeTask> ChooseCodeTask(const Mechanism& mechanism,
+                                       const std::vector<std::string>& coordinates,
+                                       Diagnostics* diagnostics) {
+  CodeTask task;
+  const std::vector<NamedCoordinate> all = NamedMotionCoordinates(mechanism);
+  const std::vector<std::string> names = NamesOf(all);
+  const auto error = [&](const std::string& message, const std::string& hint) {
+    diagnostics->AddError(mechanism.file, message, hint);
+    return std::nullopt;
+  };
+  for (const NamedCoordinate& at : all) {
+    if (at.coordinate.kind != Coordinate::Kind::kPrescribed) continue;
+    (Contains(coordinates, at.name) ? task.actuators : task.held).push_back(at);
+  }
+  std::vector<NamedCoordinate> candidates = task.held;
+  for (const std::string& name : coordinates) {
+    const auto at = std::ranges::find(all, name, &NamedCoordinate::name);
+    if (at == all.end()) {
+      return error("there is no coordinate '" + name + "'",
+                   DidYouMean(name, names, "there are: " + Joined(names, kNamed)));
+    }
+    if (std::ranges::find(candidates, name, &NamedCoordinate::name) != candidates.end()) {
+      return error("coordinate '" + name + "' is chosen twice", "each once");
+    }
+    candidates.push_back(*at);
+  }
+  if (coordinates.empty()) {
+    for (const NamedCoordinate& at : all) {
+      if (at.coordinate.kind == Coordinate::Kind::kOutput && at.coordinate.index == 0) {
+        candidates.push_back(at);
+      }
+    }
+  }
+  size_t preferred = candidates.size();
+  for (const NamedCoordinate& at : all) {
+    if (std::ranges::find(candidates, at.name, &NamedCoordinate::name) != candidates.end())
+      continue;
+    if (at.coordinate.kind == Coordinate::Kind::kDrive && coordinates.empty()) {
+      candidates.insert(candidates.begin() + static_cast<std::ptrdiff_t>(preferred++), at);
+    } else {
+      candidates.push_back(at);
+    }
+  }
+  std::vector<Coordinate> at;
+  at.reserve(candidates.size());
+  for (const NamedCoordinate& candidate : candidates) at.push_back(candidate.coordinate);
+  const CoordinateChoice choice = ChooseCoordinates(mechanism, at, preferred);
+  std::vector<std::string> chosen, depend;
+  for (const size_t k : choice.chosen) {
+    if (k < task.held.size()) continue;
+    chosen.push_back(candidates[k].name);
+    task.coordinates.push_back(candidates[k]);
+  }
+  for (const size_t k : choice.dependent) depend.push_back(candidates[k].name);
+  const bool all_chosen =
+      std::ranges::all_of(choice.chosen, [&](size_t k) { return k < preferred; });
+  if (!coordinates.empty() && (!depend.empty() || !all_chosen)) {
+    return error(depend.empty()
+                     ? fmt::format("{} has {} degrees of freedom, of which {} are held or chosen",
+                                   mechanism.name, choice.dofs, preferred)
+                     : "at home these depend on those before: " + Joined(depend, kNamed),
+                 "a set that does: " + Joined(chosen, kNamed));
+  }
+  if (choice.left() > 0 || task.coordinates.empty()) {
+    return error("no set of coordinates holds the mechanism at home",
+                 "a mechanism whose motion coordinates of joints, drives or outputs determine");
+  }
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    task.actuators.push_back(
+        {mechanism.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
+  }
+  std::ranges::rotate(task.actuators,
+                      task.actuators.end() - static_cast<std::ptrdiff_t>(mechanism.drives.size()));
+  return task;
+}
+
+CodeResult MakeCode(const Mechanism& mechanism, const CodeTask& task, const CodeSettings& settings,
+                    const std::function<void(double)>& progress) {
+  return CodeMaker(mechanism, task, settings, progress).Make();
+}
+
+}  // namespace mbv

@@ -1,0 +1,569 @@
+#include "features/code/code_check.h"
+
+#include <fmt/format.h>
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+
+#include "base/files.h"
+#include "base/scratch_folder.h"
+#include "base/worker_pool.h"
+
+namespace mbv {
+namespace {
+
+constexpr double kSame = 1e-6;  // of the largest value: a slip explains a difference
+constexpr size_t kSlipStates = 30;
+constexpr int kBranchStarts = 60, kBranchSteps = 60;
+constexpr double kHalfTurn = 180.0;
+
+// Of the drives and prescribed joints, in this order.
+VecX Chosen(const Mechanism& mechanism, const std::vector<NamedCoordinate>& actuators,
+            const VecX& of) {
+  VecX chosen(static_cast<Eigen::Index>(actuators.size()));
+  for (size_t i = 0; i < actuators.size(); ++i) {
+    const Coordinate& at = actuators[i].coordinate;
+    const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
+    chosen[static_cast<Eigen::Index>(i)] =
+        of[at.kind == Coordinate::Kind::kDrive ? at.index : drives + at.index];
+  }
+  return chosen;
+}
+
+std::vector<Coordinate> AllOf(const CodeTask& task) {
+  std::vector<Coordinate> all;
+  for (const auto* named : {&task.coordinates, &task.held}) {
+    for (const NamedCoordinate& at : *named) all.push_back(at.coordinate);
+  }
+  return all;
+}
+
+}  // namespace
+
+CodeReference::CodeReference(const Mechanism& mechanism, const CodeTask& task)
+    : mechanism_(mechanism), task_(task), model_(mechanism, AllOf(task)) {
+  held_ = model_.home().tail(static_cast<Eigen::Index>(task.held.size()));
+}
+
+bool CodeReference::Find(TestState* state, std::string* why) {
+  const auto n = static_cast<Eigen::Index>(task_.coordinates.size());
+  const auto all = model_.size();
+  VecX q(all), v = VecX::Zero(all), a = VecX::Zero(all);
+  q << state->q, held_;
+  v.head(n) = state->v;
+  a.head(n) = state->a;
+  model_.Restart();
+  RunSummary summary = model_.Move(q, v, a);
+  const auto failed = [&] {
+    *why = summary.message;
+    return !summary.ok();
+  };
+  if (failed()) return false;
+  const DrivenSample& driven = model_.sample().driven;
+  const auto chosen = [this](const VecX& of) { return Chosen(mechanism_, task_.actuators, of); };
+  state->actuators = chosen(driven.position);
+  state->rates = chosen(driven.velocity);
+  state->accelerations = chosen(driven.acceleration);
+  state->forces.resize(0);
+  if (task_.actuators.size() != task_.coordinates.size()) return true;
+  summary = model_.AllForces({});
+  if (summary.ok()) {
+    VecX forces(driven.position.size());
+    forces << model_.sample().drive_force, model_.sample().prescribed_force;
+    state->forces = chosen(forces);
+    return true;
+  }
+  // What is held needs forces that no actuator gives: those along the coordinates alone.
+  MatX T;
+  summary = model_.Motions(&T);
+  if (failed()) return false;
+  const VecX f = model_.Forces(T, {}).head(n);
+  const MatX rates = model_.DriveRates(T);
+  MatX J(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Coordinate& at = task_.actuators[static_cast<size_t>(i)].coordinate;
+    if (at.kind != Coordinate::Kind::kDrive) return false;
+    J.row(i) = rates.row(at.index).head(n);
+  }
+  const Eigen::ColPivHouseholderQR<MatX> qr(J.transpose());
+  if (!qr.isInvertible()) {
+    *why = "the actuators do not hold the coordinates";
+    return false;
+  }
+  state->forces = qr.solve(f);
+  return true;
+}
+
+double CodeClosureTolerance(const MechanismFormulas& formulas) {
+  constexpr double kRounding = 1e-10, kShare = 10.0;
+  const FormulaTape tape(formulas.closure.gaps);
+  std::vector<double> inputs(formulas.graph.inputs(), 0.0), work, gaps;
+  for (size_t i = 0; i < formulas.x.size(); ++i) {
+    inputs[formulas.graph.InputOf(formulas.x[i])] = formulas.x_home[static_cast<Eigen::Index>(i)];
+  }
+  for (size_t k = 0; k < formulas.size(); ++k) {
+    inputs[formulas.graph.InputOf(formulas.closure.q[k])] =
+        formulas.closure.home[static_cast<Eigen::Index>(k)];
+  }
+  tape.Evaluate(inputs, &work, &gaps);
+  double largest = 0.0;
+  for (const double gap : gaps) largest = std::max(largest, std::abs(gap));
+  return std::max(kRounding, kShare * largest);
+}
+
+std::string CheckProgram(const MechanismFormulas& formulas, const CodeTextOptions& options) {
+  const bool square = formulas.actuators.size() == formulas.size() && !formulas.forces.empty();
+  std::string text =
+      R"code(/* Self-test of @.h; with a file of states, values at these. Made by mbverify. */
+#include "@.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+int main(int argc, char** argv) {
+  double s[3 * @_N], d[@_ACTUATORS + 1], dd[@_ACTUATORS + 1], ddd[@_ACTUATORS + 1];
+  double tau[@_ACTUATORS + @_N], sum = 0.0, count = 0.0;
+  clock_t began;
+  FILE *in, *out;
+  @_pose p, home;
+  int table;
+  if (argc < 3) {
+    SELFTEST
+  }
+  table = argc > 3 && strcmp(argv[3], "table") == 0;
+  in = fopen(argv[1], "rb");
+  out = fopen(argv[2], "wb");
+  if (in == 0 || out == 0 || @_home(&home) != @_OK) return 2;
+  while (fread(s, sizeof s, 1, in) == 1) {
+    double status;
+    p = home;
+    status = FIND;
+    memset(d, 0, sizeof d);
+    memset(dd, 0, sizeof dd);
+    memset(ddd, 0, sizeof ddd);
+    memset(tau, 0, sizeof tau);
+    if (status == @_OK) {
+      @_actuators(&p, d);
+      @_actuator_motion(&p, s + @_N, s + 2 * @_N, dd, ddd);
+      status = FORCES;
+    }
+    fwrite(&status, sizeof status, 1, out);
+    fwrite(d, sizeof(double), @_ACTUATORS, out);
+    fwrite(dd, sizeof(double), @_ACTUATORS, out);
+    fwrite(ddd, sizeof(double), @_ACTUATORS, out);
+    fwrite(tau, sizeof(double), @_ACTUATORS, out);
+  }
+  p = home;
+  rewind(in);
+  began = clock();
+  while (count < 2e5) {
+    if (fread(s, sizeof s, 1, in) != 1) {
+      rewind(in);
+      if (count == 0.0) break;
+      continue;
+    }
+    count += 1.0;
+    if (FIND == @_OK && FORCES == @_OK) sum += tau[0];
+    if (count >= 1e4 && clock() - began > CLOCKS_PER_SEC) break;
+  }
+  printf("%g %g\n", (double)(clock() - began) / CLOCKS_PER_SEC / (count > 0.0 ? count : 1.0), sum);
+  if (fclose(out) != 0) return 2;
+  fclose(in);
+  return 0;
+}
+)code";
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    for (size_t at = text.find(from); at != std::string::npos;
+         at = text.find(from, at + to.size())) {
+      text.replace(at, from.size(), to);
+    }
+  };
+  replace("SELFTEST", square ? R"code(const double worst = @_self_test();
+    printf("%g\n", worst);
+    return worst <= 1e-9 ? 0 : 1;)code"
+                             : "return 0; /* no forces to compare */");
+  replace("FIND", options.table ? "table ? @_at(&p, s) : @_close(&p, s)" : "@_close(&p, s)");
+  replace("FORCES", square ? "@_inverse_dynamics(&p, s + @_N, s + 2 * @_N, 0, tau)" : "@_OK");
+  if (!options.table) replace("  table = argc > 3 && strcmp(argv[3], \"table\") == 0;\n", "");
+  if (!options.table) replace("  int table;\n", "");
+  replace("@", options.name);
+  return text;
+}
+
+CodeCheck::CodeCheck(const MechanismFormulas& formulas, const CodeTextOptions& options,
+                     const std::vector<TestState>& states, const std::vector<TestState>& open)
+    : formulas_(formulas), options_(options), states_(states), open_(open) {}
+
+std::string CodeCheck::Run(const std::vector<std::string>& argv,
+                           const std::filesystem::path& folder, size_t count,
+                           CodeJudgement* judgement) {
+  std::string bytes;
+  const auto add = [&](const TestState& state) {
+    for (const VecX* part : {&state.q, &state.v, &state.a}) {
+      bytes.append(reinterpret_cast<const char*>(part->data()),  // NOLINT: numbers as they are
+                   sizeof(double) * static_cast<size_t>(part->size()));
+    }
+  };
+  for (size_t i = 0; i < count; ++i) add(states_[i]);
+  const size_t open = std::min(open_.size(), count);
+  for (size_t i = 0; i < open; ++i) add(open_[i]);
+  if (!WriteFile(folder / "states", bytes).empty()) return "temporary files cannot be written";
+  WorkerEnd end;
+  WorkerPool pool;
+  pool.ended = [&](size_t /*job*/, const WorkerEnd& ended) { end = ended; };
+  if (!pool.Run({{.argv = argv, .log = folder / "log", .folder = folder}})) return "interrupted";
+  const std::string log = ReadWholeFile(folder / "log").value_or("");
+  if (!end.trouble.empty()) return end.trouble;
+  if (end.exit_code != 0) return fmt::format("ended with code {}: {}", end.exit_code, log);
+  const std::optional<std::string> values = ReadWholeFile(folder / "values");
+  const auto m = static_cast<Eigen::Index>(formulas_.actuators.size());
+  const size_t size = sizeof(double) * static_cast<size_t>(1 + 4 * m);
+  if (!values || values->size() != size * (count + open)) return "has not computed all states";
+  judgement->nanoseconds = 1e9 * std::strtod(log.c_str(), nullptr);
+  found_.clear();
+  compared_ = count;
+  std::vector<double> row(static_cast<size_t>(1 + 4 * m));
+  for (size_t i = 0; i < count + open; ++i) {
+    std::memcpy(row.data(), values->data() + i * size, size);
+    const Eigen::Map<const VecX> all(row.data() + 1, 4 * m);
+    found_.push_back(
+        {row[0] == 0.0, all.head(m), all.segment(m, m), all.segment(2 * m, m), all.tail(m)});
+  }
+  return "";
+}
+
+CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
+  CodeJudgement judgement{.language = from_table ? "C, from the table" : "C"};
+  const char* chosen = std::getenv("CC");
+  const std::string called = chosen != nullptr && *chosen != '\0' ? chosen : "cc";
+  const std::optional<std::string> compiler = FindProgram(called);
+  if (!compiler) {
+    judgement.not_judged = "there is no C compiler '" + called + "'";
+    return judgement;
+  }
+  const ScratchFolder folder("code");
+  judgement.not_judged = folder.trouble();
+  if (!judgement.not_judged.empty()) return judgement;
+  const std::filesystem::path& at = folder.path();
+  if (!WriteFile(at / (options_.name + ".h"), header).empty() ||
+      !WriteFile(at / "test.c", CheckProgram(formulas_, options_)).empty()) {
+    judgement.not_judged = "temporary files cannot be written";
+    return judgement;
+  }
+  WorkerEnd end;
+  WorkerPool pool;
+  pool.ended = [&](size_t /*job*/, const WorkerEnd& ended) { end = ended; };
+  const auto run = [&](std::vector<std::string> argv) {
+    argv.insert(argv.begin(), *compiler);
+    return pool.Run({{.argv = std::move(argv), .log = at / "log", .folder = at}});
+  };
+  const auto lines = [&] {
+    std::vector<std::string> all;
+    const std::string log = ReadWholeFile(at / "log").value_or("");
+    for (size_t from = 0; from < log.size();) {
+      const size_t to = std::min(log.find('\n', from), log.size());
+      all.push_back(log.substr(from, to - from));
+      from = to + 1;
+    }
+    return all;
+  };
+  if (run({"--version"}) && !lines().empty()) judgement.compiler = lines().front();
+  if (!run({"-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "test.c", "-o",
+            "test", "-lm"})) {
+    judgement.not_judged = "interrupted";
+    return judgement;
+  }
+  judgement.warnings = lines();
+  if (end.exit_code != 0) {
+    judgement.not_judged = "it does not compile";
+    return judgement;
+  }
+  std::vector<std::string> argv = {(at / "test").string(), "states", "values"};
+  if (from_table) argv.emplace_back("table");
+  judgement.not_judged = Run(argv, at, states_.size(), &judgement);
+  if (judgement.not_judged.empty()) Compare(&judgement);
+  if (from_table) {
+    // What lies outside of the proved cells is said by their share, not by states.
+    judgement.only_one = 0;
+  }
+  return judgement;
+}
+
+CodeJudgement CodeCheck::Python(const std::string& module, size_t most) {
+  CodeJudgement judgement{.language = "Python"};
+  const std::optional<std::string> python = FindProgram("python3");
+  if (!python) {
+    judgement.not_judged = "there is no python3";
+    return judgement;
+  }
+  const ScratchFolder folder("code");
+  judgement.not_judged = folder.trouble();
+  if (!judgement.not_judged.empty()) return judgement;
+  const bool square = formulas_.actuators.size() == formulas_.size() && !formulas_.forces.empty();
+  const std::string program =
+      fmt::format(R"code(import struct, sys, time
+sys.path.insert(0, ".")
+import {0} as code
+data = open("states", "rb").read()
+size, m = 3 * code.N, code.ACTUATORS
+values, began, count = open("values", "wb"), time.perf_counter(), 0
+for at in range(0, len(data), 8 * size):
+    s = struct.unpack_from("%dd" % size, data, at)
+    q, v, a = s[:code.N], s[code.N:2 * code.N], s[2 * code.N:]
+    p = code.Pose()
+    row = [float(code.close(p, q))] + [0.0] * (4 * m)
+    count += 1
+    if row[0] == code.OK:
+        dd, ddd = code.actuator_motion(p, v, a)
+        tau = {1}
+        row = [0.0 if tau is not None else 2.0] + code.actuators(p) + dd + ddd + (tau or [0.0] * m)
+    values.write(struct.pack("%dd" % len(row), *row))
+print((time.perf_counter() - began) / max(1, count))
+)code",
+                  options_.name, square ? "code.inverse_dynamics(p, v, a)" : "[0.0] * m");
+  if (!WriteFile(folder.path() / (options_.name + ".py"), module).empty() ||
+      !WriteFile(folder.path() / "run.py", program).empty()) {
+    judgement.not_judged = "temporary files cannot be written";
+    return judgement;
+  }
+  judgement.not_judged =
+      Run({*python, "run.py"}, folder.path(), std::min(most, states_.size()), &judgement);
+  if (judgement.not_judged.empty()) Compare(&judgement);
+  return judgement;
+}
+
+void CodeCheck::Compare(CodeJudgement* judgement) const {
+  const auto m = static_cast<Eigen::Index>(formulas_.actuators.size());
+  const bool forces =
+      !states_.empty() && states_[0].forces.size() == m && !formulas_.forces.empty();
+  // Per actuator: of positions, rates, accelerations, forces.
+  std::array<VecX, 4> worst, largest;
+  for (size_t part = 0; part < 4; ++part) worst[part] = largest[part] = VecX::Zero(m);
+  for (size_t i = 0; i < found_.size(); ++i) {
+    const Found& found = found_[i];
+    if (i >= compared_) {
+      judgement->only_one += found.reached ? 1 : 0;
+      continue;
+    }
+    if (!found.reached) {
+      ++judgement->only_one;
+      continue;
+    }
+    ++judgement->states;
+    const TestState& state = states_[i];
+    const std::array<const VecX*, 4> has = {&found.actuators, &found.rates, &found.accelerations,
+                                            &found.forces};
+    const std::array<const VecX*, 4> should = {&state.actuators, &state.rates, &state.accelerations,
+                                               &state.forces};
+    for (size_t part = 0; part < (forces ? 4U : 3U); ++part) {
+      worst[part] = worst[part].cwiseMax((*has[part] - *should[part]).cwiseAbs());
+      largest[part] = largest[part].cwiseMax(should[part]->cwiseAbs());
+    }
+  }
+  // By the largest value of all actuators of the same unit would hide a small one: by its own, but
+  // not below rounding of the others.
+  const auto relative = [&](size_t part) {
+    double most = 0.0;
+    const double floor = 1e-6 * largest[part].maxCoeff();
+    for (Eigen::Index k = 0; k < m; ++k) {
+      const double scale = std::max(largest[part][k], floor);
+      if (scale > 0.0) most = std::max(most, worst[part][k] / scale);
+    }
+    return most;
+  };
+  if (judgement->states == 0 || m == 0) return;
+  judgement->position = relative(0);
+  judgement->jacobian = std::max(relative(1), relative(2));
+  if (forces) judgement->force = relative(3);
+}
+
+std::string CodeCheck::Slip(CodeReference* reference) const {
+  const size_t count = std::min(kSlipStates, compared_);
+  const auto m = static_cast<Eigen::Index>(formulas_.actuators.size());
+  const auto name = [&](Eigen::Index k) {
+    return "'" + formulas_.actuators[static_cast<size_t>(k)].name + "'";
+  };
+  const auto coordinate = [&](size_t k) {
+    return "'" + formulas_.closure.coordinates[k].name + "'";
+  };
+  std::vector<size_t> both;
+  for (size_t i = 0; i < count; ++i) {
+    if (found_[i].reached) both.push_back(i);
+  }
+  if (both.empty()) return "it reaches none of the states";
+  const auto close = [](const VecX& a, const VecX& b) {
+    return (a - b).cwiseAbs().maxCoeff() <= kSame * std::max(1e-300, b.cwiseAbs().maxCoeff());
+  };
+  // What an actuator has over the states.
+  const auto series = [&](bool force, bool has, Eigen::Index k) {
+    VecX values(static_cast<Eigen::Index>(both.size()));
+    for (size_t i = 0; i < both.size(); ++i) {
+      const Found& found = found_[both[i]];
+      const TestState& state = states_[both[i]];
+      const VecX& of =
+          force ? (has ? found.forces : state.forces) : (has ? found.actuators : state.actuators);
+      values[static_cast<Eigen::Index>(i)] = of[k];
+    }
+    return values;
+  };
+  struct Factor {
+    double by;
+    const char* says;
+  };
+  const std::array<Factor, 4> factors = {Factor{1.0, ""}, Factor{-1.0, "has the other sign"},
+                                         Factor{kHalfTurn / M_PI, "is in degrees"},
+                                         Factor{M_PI / kHalfTurn, "is taken from degrees"}};
+  const auto of_outputs = [&](bool force) -> std::string {
+    std::string slips;
+    for (Eigen::Index i = 0; i < m; ++i) {
+      const VecX has = series(force, true, i);
+      bool explained = close(has, series(force, false, i));
+      if (explained) continue;
+      for (Eigen::Index j = 0; j < m && !explained; ++j) {
+        for (const Factor& factor : factors) {
+          const Eigen::Index k = (i + j) % m;  // itself first
+          if (!close(has, factor.by * series(force, false, k))) continue;
+          explained = true;
+          if (!slips.empty()) slips += "; ";
+          slips += fmt::format("the {} of {} is that of {}", force ? "force" : "position", name(i),
+                               name(k));
+          if (k == i)
+            slips = slips.substr(0, slips.rfind(" is that of")) + " " + factor.says;
+          else if (factor.by != 1.0)
+            slips += fmt::format(" and {}", factor.says);
+          break;
+        }
+      }
+      if (!explained) return "";
+    }
+    return slips;
+  };
+  bool positions_right = true;
+  for (Eigen::Index k = 0; k < m; ++k) {
+    positions_right = positions_right && close(series(false, true, k), series(false, false, k));
+  }
+  if (std::string slip = of_outputs(positions_right); !slip.empty()) return slip;
+  if (positions_right) return "";
+  // The coordinates taken otherwise.
+  const size_t n = formulas_.size();
+  const auto taken = [&](const std::function<void(VecX*)>& change) {
+    size_t reached = 0;
+    for (const size_t i : both) {
+      TestState state = states_[i];
+      change(&state.q);
+      change(&state.v);
+      change(&state.a);
+      std::string why;
+      if (!reference->Find(&state, &why)) continue;
+      ++reached;
+      if (!close(found_[i].actuators, state.actuators)) return false;
+    }
+    return reached > 0;
+  };
+  for (size_t k = 0; k < n; ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    for (size_t l = 0; l < k; ++l) {
+      const auto other = static_cast<Eigen::Index>(l);
+      if (taken([&](VecX* q) { std::swap((*q)[at], (*q)[other]); })) {
+        return fmt::format("the coordinates {} and {} are exchanged", coordinate(l), coordinate(k));
+      }
+    }
+    if (taken([&](VecX* q) { (*q)[at] *= -1.0; })) {
+      return fmt::format("the coordinate {} has the other sign", coordinate(k));
+    }
+  }
+  for (const double factor : {kHalfTurn / M_PI, M_PI / kHalfTurn}) {
+    if (taken([&](VecX* q) { *q *= factor; })) {
+      return factor < 1.0 ? "the coordinates are taken as degrees"
+                          : "the coordinates are turned into degrees";
+    }
+  }
+  for (const size_t i : both) {
+    if (close(found_[i].actuators, states_[i].actuators)) continue;
+    if (ClosesOtherwise(states_[i].q, found_[i].actuators)) {
+      return "another branch: the loops close with its positions, too, in an assembly that the "
+             "home "
+             "pose does not lead to";
+    }
+    break;
+  }
+  return "";
+}
+
+// Least squares of all loops with coordinates and actuators given, from random places.
+bool CodeCheck::ClosesOtherwise(const VecX& q, const VecX& actuators) const {
+  const ClosureFormulas& closure = formulas_.closure;
+  std::vector<Expr> rows = closure.gaps;
+  for (const Expr& value : closure.values) rows.push_back(value);
+  for (const ActuatorFormula& actuator : formulas_.actuators) rows.push_back(actuator.value);
+  const FormulaTape tape(rows);
+  std::vector<double> inputs(formulas_.graph.inputs(), 0.0), work, values;
+  for (size_t k = 0; k < closure.q.size(); ++k) {
+    inputs[formulas_.graph.InputOf(closure.q[k])] = q[static_cast<Eigen::Index>(k)];
+  }
+  const auto n = static_cast<Eigen::Index>(formulas_.x.size());
+  const auto gap = [&](const VecX& x) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      inputs[formulas_.graph.InputOf(formulas_.x[static_cast<size_t>(i)])] = x[i];
+    }
+    tape.Evaluate(inputs, &work, &values);
+    VecX r = Eigen::Map<VecX>(values.data(), static_cast<Eigen::Index>(values.size()));
+    const auto gaps = static_cast<Eigen::Index>(closure.gaps.size());
+    // Angles but for turns.
+    const auto less = [](double a, double b) { return std::remainder(a - b, 2.0 * M_PI); };
+    for (Eigen::Index k = 0; k < q.size(); ++k) r[gaps + k] = less(r[gaps + k], q[k]);
+    for (Eigen::Index k = 0; k < actuators.size(); ++k) {
+      r[gaps + q.size() + k] = less(r[gaps + q.size() + k], actuators[k]);
+    }
+    return r;
+  };
+  std::mt19937_64 random(1);  // NOLINT(cert-msc51-cpp): the same each time
+  std::uniform_real_distribution<double> turn(-M_PI, M_PI);
+  for (int start = 0; start < kBranchStarts; ++start) {
+    VecX x = formulas_.x_home;
+    for (const TreeRate& rate : formulas_.rates) {
+      if (rate.length) continue;
+      if (rate.ball < 0) x[rate.x] += turn(random);
+      if (rate.ball == 0)
+        x.segment<4>(rate.x) =
+            Eigen::Vector4d::NullaryExpr([&] { return turn(random); }).normalized();
+    }
+    double damping = 1.0;
+    VecX r = gap(x);
+    for (int step = 0; step < kBranchSteps && r.norm() > 1e-9; ++step) {
+      MatX J(r.size() + n, n);
+      constexpr double kStep = 1e-6;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        VecX moved = x;
+        moved[i] += kStep;
+        const VecX up = gap(moved);
+        moved[i] -= 2.0 * kStep;
+        J.col(i).head(r.size()) = (up - gap(moved)) / (2.0 * kStep);
+      }
+      J.bottomRows(n) = std::sqrt(damping) * MatX::Identity(n, n);
+      VecX right = VecX::Zero(r.size() + n);
+      right.head(r.size()) = -r;
+      VecX next = x + VecX(J.colPivHouseholderQr().solve(right));
+      for (const TreeRate& rate : formulas_.rates) {
+        if (rate.ball == 0) next.segment<4>(rate.x).normalize();
+      }
+      const VecX left = gap(next);
+      if (left.norm() < r.norm()) {
+        x = next;
+        r = left;
+        damping *= 0.2;
+      } else {
+        damping *= 5.0;
+      }
+    }
+    if (r.norm() <= 1e-7) return true;
+  }
+  return false;
+}
+
+}  // namespace mbv

@@ -1,0 +1,42 @@
+// The text of a mechanism's equations in C99 and Python.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "features/code/mechanism_formulas.h"
+
+namespace mbv {
+
+/// A state with what the reference finds there. Per coordinate, then per actuator.
+struct TestState {
+  VecX q, v, a, actuators, forces, rates, accelerations;
+};
+
+/// Start values for Newton's method over a box of q, and where they are proved to do.
+struct StartTable {
+  VecX low, high;               ///< of the box [rad or m]
+  std::vector<int> nodes = {};  ///< per coordinate, at least 2
+  MatX x = {};  ///< nodes × positions that are searched; the last coordinate runs fastest
+  std::vector<int> cells = {};    ///< per coordinate
+  std::vector<bool> proved = {};  ///< per cell
+  int steps = 0;                  ///< of Newton's method
+  double bound = kNan;            ///< of the error of x that is left [rad, or L] at proved cells
+};
+
+struct CodeTextOptions {
+  std::string name;                  ///< before all names in C
+  std::vector<std::string> heading;  ///< comment lines
+  std::vector<TestState> tests;
+  double tolerance = 1e-9;  ///< of the closed loops, as RowFormula::residual
+  std::optional<StartTable> table;
+};
+
+/// A header without library (but math.h) and heap.
+[[nodiscard]] std::string CHeader(const MechanismFormulas& formulas,
+                                  const CodeTextOptions& options);
+/// The same functions in Python without packages.
+[[nodiscard]] std::string PythonModule(const MechanismFormulas& formulas,
+                                       const CodeTextOptions& options);
+
+}  // namespace mbv
