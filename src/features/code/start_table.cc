@@ -16,12 +16,14 @@ namespace {
 // widened beyond their errors.
 class Interval {
  public:
-  using Base =
-      boost::numeric::interval<double,
-                               boost::numeric::interval_lib::policies<
-                                   boost::numeric::interval_lib::save_state<
-                                       boost::numeric::interval_lib::rounded_transc_std<double>>,
-                                   boost::numeric::interval_lib::checking_base<double>>>;
+  // While a Guard lives, the processor rounds as these operations need it.
+  using Protected = boost::numeric::interval<
+      double, boost::numeric::interval_lib::policies<
+                  boost::numeric::interval_lib::save_state<
+                      boost::numeric::interval_lib::rounded_transc_std<double>>,
+                  boost::numeric::interval_lib::checking_base<double>>>;
+  using Base = boost::numeric::interval_lib::unprotect<Protected>::type;
+  using Guard = Protected::traits_type::rounding;
   Interval() = default;
   explicit Interval(double value) : in_(value) {}
   Interval(double low, double high) : in_(low, high) {}
@@ -64,7 +66,8 @@ class Interval {
 
 constexpr size_t kLargestBlock = 8;  // second derivatives grow with its cube
 constexpr double kConverged = 1e-12;
-constexpr int kMostSteps = 5;
+constexpr double kSameSolution = 1e-7;
+constexpr int kLongWay = 64;  // steps of a walk
 constexpr double kBound = 1e-12;  // of the error that is left
 
 // Newton's method as the code does it.
@@ -247,10 +250,10 @@ struct BlockTapes {
 
 // What is proved of a cell.
 struct ProvedCell {
-  VecX centre;                   // x at its centre
-  VecX low, high;                // of x
-  std::vector<Interval> slopes;  // ∂x/∂q, positions × coordinates
-  double error = 0.0;            // left after the steps
+  VecX centre;         // x at its centre
+  MatX slopes;         // G: positions × coordinates, at the centre
+  VecX radius;         // of x over the cell, beyond c + G (q − q_c)
+  double error = 0.0;  // left after the steps
 };
 
 class CellProver {
@@ -264,38 +267,33 @@ class CellProver {
   std::optional<ProvedCell> Prove(const VecX& low, const VecX& high, const VecX& start,
                                   const MatX& slope_low, const MatX& slope_high, int steps) {
     const VecX middle = 0.5 * (low + high), half = 0.5 * (high - low);
-    const auto n = static_cast<Eigen::Index>(f_.size());
     ProvedCell cell;
     cell.centre = start;
     if (!finder_.Find(middle, &cell.centre)) return std::nullopt;
-    cell.low = cell.high = cell.centre;
-    cell.slopes.assign(f_.x.size() * f_.size(), Interval(0.0));
+    const auto x_size = static_cast<Eigen::Index>(f_.x.size());
+    const Interval::Guard rounding;
+    cell.slopes = MatX::Zero(x_size, static_cast<Eigen::Index>(f_.size()));
+    cell.radius = VecX::Zero(x_size);
     inputs_.assign(f_.graph.inputs(), Interval(0.0));
-    for (size_t i = 0; i < f_.x.size(); ++i) Set(i, cell.centre[static_cast<Eigen::Index>(i)], 0.0);
+    for (size_t i = 0; i < f_.x.size(); ++i) {
+      Set(i, cell.centre[static_cast<Eigen::Index>(i)], 0.0);
+    }
     for (size_t k = 0; k < f_.size(); ++k) {
       const auto at = static_cast<Eigen::Index>(k);
-      q_[k] = Interval(middle[at] - half[at], middle[at] + half[at]);
-      inputs_[f_.graph.InputOf(f_.closure.q[k])] = q_[k];
+      inputs_[f_.graph.InputOf(f_.closure.q[k])] = Interval(low[at], high[at]);
       if (f_.closure.direct[k] < 0) continue;
-      const int x = f_.rates[static_cast<size_t>(f_.closure.direct[k])].x;
-      inputs_[f_.graph.InputOf(f_.x[static_cast<size_t>(x)])] = q_[k];
-      cell.low[x] = low[at];
-      cell.high[x] = high[at];
-      cell.slopes[static_cast<size_t>(x) * f_.size() + k] = Interval(1.0);
+      const size_t x = PlaceOf(f_.closure.direct[k]);
+      cell.slopes(static_cast<Eigen::Index>(x), at) = 1.0;
+      SetAround(x, cell, half, 0.0);
     }
     double before = 0.0;  // error of the blocks before
     for (size_t b = 0; b < tapes_.size(); ++b) {
       if (!ProveBlock(b, middle, half, start, slope_low, slope_high, steps, &cell, &before))
         return std::nullopt;
     }
-    (void)n;
     cell.error = before;
     return cell;
   }
-
-  // Bounds of ∂²x/∂q_i∂q_j on the last cell's box, by differentiating r twice:
-  // J y_ij = −γ_ij.
-  [[nodiscard]] const std::vector<Interval>& inputs() const { return inputs_; }
 
  private:
   void Set(size_t x, double centre, double radius) {
@@ -346,6 +344,12 @@ class CellProver {
     return J;
   }
 
+  // y over the cell: c + G (q − q_c) + e, |e_i| <= radius_i.
+  void SetAround(size_t x, const ProvedCell& cell, const VecX& half, double more) {
+    const auto at = static_cast<Eigen::Index>(x);
+    Set(x, cell.centre[at], cell.slopes.row(at).cwiseAbs() * half + cell.radius[at] + more);
+  }
+
   bool ProveBlock(size_t b, const VecX& middle, const VecX& half, const VecX& start,
                   const MatX& slope_low, const MatX& slope_high, int steps, ProvedCell* cell,
                   double* before) {
@@ -353,141 +357,135 @@ class CellProver {
     const size_t m = block.rates.size(), n = f_.size(), known = block.known.size();
     const auto M = static_cast<Eigen::Index>(m);
     const std::vector<Interval> box = inputs_;  // what is before this block, over the cell
-    // A: inverse at the centre.
-    for (size_t i = 0; i < f_.x.size(); ++i)
+    // All at the centre: A = J⁻¹, slopes, residual.
+    for (size_t i = 0; i < f_.x.size(); ++i) {
       Set(i, cell->centre[static_cast<Eigen::Index>(i)], 0.0);
-    for (size_t k = 0; k < n; ++k)
+    }
+    for (size_t k = 0; k < n; ++k) {
       inputs_[f_.graph.InputOf(f_.closure.q[k])] = Interval(middle[static_cast<Eigen::Index>(k)]);
-    const IntervalMatrix at_centre = ScaledColumns(b);
+    }
+    const IntervalMatrix J_centre = ScaledColumns(b);
     const std::vector<Interval> residual = Evaluate(tapes_[b].residual);
-    MatX J(M, M);
+    MatX J(M, M), right(M, static_cast<Eigen::Index>(n));
     for (Eigen::Index i = 0; i < M; ++i) {
-      for (Eigen::Index j = 0; j < M; ++j)
-        J(i, j) = at_centre[static_cast<size_t>(i * M + j)].low();
+      for (Eigen::Index j = 0; j < M; ++j) J(i, j) = J_centre[static_cast<size_t>(i * M + j)].low();
     }
     const Eigen::FullPivLU<MatX> lu(J);
     if (!lu.isInvertible()) return false;
     const MatX A = lu.inverse();
-    // How much y moves over the cell, about: twice what the slopes at the centre say.
-    inputs_ = box;
-    const std::vector<Interval> others = Evaluate(tapes_[b].others),
-                                by_q = Evaluate(tapes_[b].by_q);
+    // ∂r/∂q along what is known, by interval arithmetic at the inputs.
+    const auto along = [&] {
+      const std::vector<Interval> others = Evaluate(tapes_[b].others), by_q = Evaluate(tapes_[b].by_q);
+      std::vector<Interval> sum(m * n);
+      for (size_t i = 0; i < m; ++i) {
+        for (size_t k = 0; k < n; ++k) {
+          Interval& at = sum[i * n + k] = by_q[k * m + i];
+          for (size_t j = 0; j < known; ++j) {
+            const auto x = static_cast<Eigen::Index>(PlaceOf(block.known[j]));
+            at = at + others[i * known + j] * Interval(cell->slopes(x, static_cast<Eigen::Index>(k)));
+          }
+        }
+      }
+      return sum;
+    };
+    const std::vector<Interval> along_centre = along();
+    for (size_t i = 0; i < m; ++i) {
+      for (size_t k = 0; k < n; ++k) {
+        right(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = along_centre[i * n + k].low();
+      }
+    }
+    const MatX G = -A * right;  // scaled
+    const auto set_block = [&](const std::vector<double>& radius, double more) {
+      for (size_t i = 0; i < m; ++i) {
+        const size_t x = PlaceOf(block.rates[i]);
+        const double unit = ScaleOf(block.rates[i]);
+        cell->slopes.row(static_cast<Eigen::Index>(x)) = unit * G.row(static_cast<Eigen::Index>(i));
+        cell->radius[static_cast<Eigen::Index>(x)] = unit * radius[i];
+        SetAround(x, *cell, half, unit * more);
+      }
+    };
+    // A r(c + G δ, q_c + δ) over the cell, by its mean value form.
     const auto times_A = [&](const std::vector<Interval>& v) {
       std::vector<Interval> Av(m, Interval(0.0));
       for (size_t i = 0; i < m; ++i) {
         for (size_t j = 0; j < m; ++j) {
-          Av[i] = Av[i] +
-                  Interval(A(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))) * v[j];
+          Av[i] = Av[i] + Interval(A(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))) * v[j];
         }
       }
       return Av;
     };
-    // r at the centre of y over the cell, by its mean value form.
-    const auto r_over = [&](const std::vector<Interval>& with_others,
-                            const std::vector<Interval>& with_q) {
+    const auto predicted = [&](const IntervalMatrix& columns) {
+      const std::vector<Interval> others = Evaluate(tapes_[b].others), slopes = along();
       std::vector<Interval> r = residual;
       for (size_t i = 0; i < m; ++i) {
-        for (size_t j = 0; j < known; ++j) {
-          const size_t x = PlaceOf(block.known[j]);
-          const Interval& U = box[f_.graph.InputOf(f_.x[x])];
-          r[i] = r[i] + with_others[i * known + j] *
-                            (U - Interval(cell->centre[static_cast<Eigen::Index>(x)]));
-        }
         for (size_t k = 0; k < n; ++k) {
           const auto at = static_cast<Eigen::Index>(k);
-          r[i] = r[i] + with_q[k * m + i] * Interval(-half[at], half[at]);
+          Interval slope = slopes[i * n + k];
+          for (size_t j = 0; j < m; ++j) {
+            slope = slope + columns[i * m + j] * Interval(G(static_cast<Eigen::Index>(j), at));
+          }
+          r[i] = r[i] + slope * Interval(-half[at], half[at]);
+        }
+        for (size_t j = 0; j < known; ++j) {
+          const double e = cell->radius[static_cast<Eigen::Index>(PlaceOf(block.known[j]))];
+          r[i] = r[i] + others[i * known + j] * Interval(-e, e);
         }
       }
-      return r;
+      return times_A(r);
     };
-    std::vector<double> radius(m);
-    {
-      const std::vector<Interval> Ar = times_A(r_over(others, by_q));
-      for (size_t i = 0; i < m; ++i) radius[i] = 1.5 * Ar[i].magnitude() + 1e-10;
-    }
+    std::vector<double> radius(m, 0.0);
     IntervalMatrix E;
     double contraction = 1.0;
     bool inside = false;
-    for (int pass = 0; pass < 6 && !inside; ++pass) {
+    for (int pass = 0; pass < 8 && !inside; ++pass) {
       inputs_ = box;
-      for (size_t i = 0; i < m; ++i) {
-        const size_t x = PlaceOf(block.rates[i]);
-        Set(x, cell->centre[static_cast<Eigen::Index>(x)], radius[i] * ScaleOf(block.rates[i]));
-        if (!(radius[i] < 0.7)) return false;
-      }
-      contraction = Contraction(A, ScaledColumns(b), &E);
+      set_block(radius, 0.0);
+      const IntervalMatrix columns = ScaledColumns(b);
+      contraction = Contraction(A, columns, &E);
       if (!(contraction < 0.9)) return false;
-      const std::vector<Interval> r = r_over(Evaluate(tapes_[b].others), Evaluate(tapes_[b].by_q));
-      const std::vector<Interval> Ar = times_A(r);
-      inside = true;
+      const std::vector<Interval> Ar = predicted(columns);
+      inside = pass > 0;
       std::vector<double> next(m);
       for (size_t i = 0; i < m; ++i) {
         Interval k = -Ar[i];
         for (size_t j = 0; j < m; ++j) k = k + E[i * m + j] * Interval(-radius[j], radius[j]);
         inside = inside && k.magnitude() < radius[i];
-        next[i] = 1.2 * k.magnitude() + 1e-10;
+        next[i] = 1.3 * k.magnitude() + 1e-10;
+        if (!(next[i] < 0.7)) return false;
       }
       if (!inside) radius = next;
     }
     if (!inside) return false;
-    // Slopes of y* over the cell: J G = −(others G_known + by_q).
-    std::vector<Interval> slopes(m * n, Interval(0.0));
-    const std::vector<Interval> others_in = Evaluate(tapes_[b].others),
-                                q_in = Evaluate(tapes_[b].by_q);
-    const double widen = contraction / (1.0 - contraction);
     double D = 0.0;
-    const auto inverse_times = [&](const std::vector<Interval>& v) {
-      std::vector<Interval> w = times_A(v);
-      double most = 0.0;
-      for (const Interval& part : w) most = std::max(most, part.magnitude());
-      for (Interval& part : w) part = part + Interval(-widen * most, widen * most);
-      return w;
-    };
-    for (size_t k = 0; k < n; ++k) {
-      std::vector<Interval> v(m);
-      for (size_t i = 0; i < m; ++i) {
-        v[i] = -q_in[k * m + i];
-        for (size_t j = 0; j < known; ++j) {
-          v[i] = v[i] - others_in[i * known + j] * cell->slopes[PlaceOf(block.known[j]) * n + k];
-        }
-      }
-      const std::vector<Interval> w = inverse_times(v);
-      for (size_t i = 0; i < m; ++i) slopes[i * n + k] = w[i] * Interval(ScaleOf(block.rates[i]));
-    }
     if (*before > 0.0) {
+      const std::vector<Interval> others = Evaluate(tapes_[b].others);
       std::vector<Interval> v(m, Interval(0.0));
       for (size_t i = 0; i < m; ++i) {
         for (size_t j = 0; j < known; ++j) {
-          const bool direct =
-              std::ranges::find(f_.closure.direct, block.known[j]) != f_.closure.direct.end();
-          if (direct) continue;  // exact
-          const double most = others_in[i * known + j].magnitude() * ScaleOf(block.known[j]);
+          if (std::ranges::find(f_.closure.direct, block.known[j]) != f_.closure.direct.end()) {
+            continue;  // exact
+          }
+          const double most = others[i * known + j].magnitude() * ScaleOf(block.known[j]);
           v[i] = v[i] + Interval(-most, most);
         }
       }
-      for (const Interval& part : inverse_times(v)) D = std::max(D, part.magnitude());
+      for (const Interval& part : times_A(v)) D = std::max(D, part.magnitude() / (1.0 - contraction));
     }
     // (2)
     double error = 0.0;
     for (size_t i = 0; i < m; ++i) {
       const auto x = static_cast<Eigen::Index>(PlaceOf(block.rates[i]));
-      double e = std::abs(start[x] - cell->centre[x]);
+      double e = std::abs(start[x] - cell->centre[x]) + cell->radius[x];
       for (size_t k = 0; k < n; ++k) {
         const auto at = static_cast<Eigen::Index>(k);
-        const Interval off = Interval(slope_low(x, at), slope_high(x, at)) - slopes[i * n + k];
-        e += off.magnitude() * half[at];
+        e += half[at] * std::max(std::abs(slope_low(x, at) - cell->slopes(x, at)),
+                                 std::abs(slope_high(x, at) - cell->slopes(x, at)));
       }
       error = std::max(error, e / ScaleOf(block.rates[i]));
     }
     // (3), on the box widened by the error.
-    for (size_t i = 0; i < m; ++i) {
-      const size_t x = PlaceOf(block.rates[i]);
-      const double at = cell->centre[static_cast<Eigen::Index>(x)], unit = ScaleOf(block.rates[i]);
-      cell->low[static_cast<Eigen::Index>(x)] = at - radius[i] * unit;
-      cell->high[static_cast<Eigen::Index>(x)] = at + radius[i] * unit;
-      for (size_t k = 0; k < n; ++k) cell->slopes[x * n + k] = slopes[i * n + k];
-      Set(x, at, (radius[i] + error) * unit);
-    }
+    inputs_ = box;
+    set_block(radius, error);
     const double wide = Contraction(A, ScaledColumns(b), &E);
     if (!(wide < 0.9)) return false;
     const std::vector<Interval> H = Evaluate(tapes_[b].second);
@@ -496,8 +494,7 @@ class CellProver {
       double sum = 0.0;
       for (size_t k = 0; k < m; ++k) {
         for (size_t j = 0; j < m; ++j) {
-          sum += H[(k * m + i) * m + j].magnitude() * ScaleOf(block.rates[j]) *
-                 ScaleOf(block.rates[k]);
+          sum += H[(k * m + i) * m + j].magnitude() * ScaleOf(block.rates[j]) * ScaleOf(block.rates[k]);
         }
       }
       second = std::max(second, sum);
@@ -507,17 +504,13 @@ class CellProver {
     for (int step = 0; step < steps; ++step) {
       const double from = error + D * *before;
       const double next = C * from * from + D * *before;
-      if (!(next < 0.9 * error) && next > kBound) return false;
+      if (!(next < 0.9 * error) && !(next <= kBound)) return false;
       error = next;
     }
     if (!(error <= kBound)) return false;
     *before = std::max(*before, error);
-    // What later blocks see of y: over the cell, as computed.
     inputs_ = box;
-    for (size_t i = 0; i < m; ++i) {
-      const size_t x = PlaceOf(block.rates[i]);
-      Set(x, cell->centre[static_cast<Eigen::Index>(x)], radius[i] * ScaleOf(block.rates[i]));
-    }
+    set_block(radius, 0.0);
     return true;
   }
 
@@ -525,21 +518,276 @@ class CellProver {
   PoseFinder& finder_;
   std::vector<BlockTapes> tapes_;
   std::vector<Interval> inputs_, work_;
-  std::array<Interval, 3> q_;
 };
 
 double Printed(double value) { return std::strtod(fmt::format("{:.7g}", value).c_str(), nullptr); }
+
+// Fills a table's nodes, and finds where it is proved.
+class TableMaker {
+ public:
+  TableMaker(const MechanismFormulas& formulas, const VecX& low, const VecX& high,
+             const std::function<void(double)>& progress)
+      : f_(formulas),
+        low_(low),
+        high_(high),
+        finder_(formulas),
+        prover_(formulas, &finder_),
+        progress_(progress) {}
+
+  // With `nodes` per coordinate, and cells that they divide.
+  StartTable Make(int nodes, int cells) {
+    table_ = StartTable{.low = low_, .high = high_};
+    table_.nodes.assign(f_.size(), nodes);
+    table_.cells.assign(f_.size(), cells);
+    table_.steps = kSteps;
+    FillNodes();
+    leaves_.clear();
+    failed_.assign(static_cast<size_t>(CellGrid().size()), false);
+    Grid roots(table_.nodes, low_, high_);
+    for (int& count : roots.counts) --count;
+    const int size = cells / (nodes - 1);
+    for (int root = 0; root < roots.size(); ++root) {
+      std::vector<int> from = roots.At(root);
+      for (int& at : from) at *= size;
+      Divide(from, size);
+      if (progress_) progress_(static_cast<double>(root) / roots.size());
+    }
+    Connect();
+    return std::move(table_);
+  }
+
+ private:
+  static constexpr int kSteps = 3;   // of Newton's method
+  static constexpr int kSplits = 3;  // of a cell, where that is needed
+
+  struct Leaf {
+    VecX low, high;
+    ProvedCell cell;
+    std::vector<int> from;  // first of its cells
+    int size = 1;           // cells along each coordinate; parts of one: 1
+  };
+
+  // Cells, as if their first corners were points.
+  [[nodiscard]] Grid CellGrid() const {
+    std::vector<int> points = table_.cells;
+    for (int& count : points) ++count;
+    Grid grid(points, low_, high_);
+    grid.counts = table_.cells;
+    return grid;
+  }
+
+  void FillNodes() {
+    const Grid grid(table_.nodes, low_, high_);
+    const std::vector<std::optional<VecX>> poses = PosesAt(f_, &finder_, grid);
+    table_.x = MatX(grid.size(), f_.x_home.size());
+    for (int i = 0; i < grid.size(); ++i) {
+      // Out of reach: as the nearest node that is not.
+      const VecX* pose = &f_.x_home;
+      double distance = std::numeric_limits<double>::infinity();
+      for (int j = 0; j < grid.size(); ++j) {
+        if (!poses[static_cast<size_t>(j)]) continue;
+        const VecX apart = grid.Point(grid.At(i)) - grid.Point(grid.At(j));
+        const double to = apart.cwiseQuotient(grid.step).norm();
+        if (to < distance) distance = to, pose = &*poses[static_cast<size_t>(j)];
+      }
+      table_.x.row(i) = pose->unaryExpr(&Printed).transpose();
+    }
+  }
+
+  // x between the nodes around `inside`, and its slopes, at q.
+  VecX Interpolate(const VecX& inside, const VecX& q, MatX* slopes) const {
+    const Grid grid(table_.nodes, low_, high_);
+    const size_t n = f_.size();
+    std::vector<int> first(n);
+    VecX part(static_cast<Eigen::Index>(n));
+    for (size_t k = 0; k < n; ++k) {
+      const auto at = static_cast<Eigen::Index>(k);
+      const double t = (inside[at] - low_[at]) / grid.step[at];
+      first[k] = std::clamp(static_cast<int>(t), 0, table_.nodes[k] - 2);
+      part[at] = (q[at] - low_[at]) / grid.step[at] - first[k];
+    }
+    VecX x = VecX::Zero(table_.x.cols());
+    *slopes = MatX::Zero(table_.x.cols(), static_cast<Eigen::Index>(n));
+    for (int corner = 0; corner < (1 << n); ++corner) {
+      std::vector<int> at = first;
+      for (size_t k = 0; k < n; ++k) at[k] += (corner >> k) & 1;
+      const VecX node = table_.x.row(grid.Index(at)).transpose();
+      const auto weight = [&](size_t k) {
+        const double p = part[static_cast<Eigen::Index>(k)];
+        return ((corner >> k) & 1) != 0 ? p : 1.0 - p;
+      };
+      double all = 1.0;
+      for (size_t k = 0; k < n; ++k) all *= weight(k);
+      x += all * node;
+      for (size_t k = 0; k < n; ++k) {
+        double slope = ((corner >> k) & 1) != 0 ? 1.0 : -1.0;
+        for (size_t j = 0; j < n; ++j) slope *= j == k ? 1.0 : weight(j);
+        slopes->col(static_cast<Eigen::Index>(k)) +=
+            slope / grid.step[static_cast<Eigen::Index>(k)] * node;
+      }
+    }
+    return x;
+  }
+
+  std::optional<ProvedCell> Prove(const VecX& low, const VecX& high) {
+    const VecX middle = 0.5 * (low + high);
+    MatX slopes, slope_low, slope_high;
+    for (int corner = 0; corner < (1 << f_.size()); ++corner) {
+      VecX q = low;
+      for (Eigen::Index k = 0; k < q.size(); ++k) {
+        if (((corner >> k) & 1) != 0) q[k] = high[k];
+      }
+      (void)Interpolate(middle, q, &slopes);
+      slope_low = corner == 0 ? slopes : slope_low.cwiseMin(slopes).eval();
+      slope_high = corner == 0 ? slopes : slope_high.cwiseMax(slopes).eval();
+    }
+    VecX start = Interpolate(middle, middle, &slopes);
+    finder_.Place(middle, &start);
+    return prover_.Prove(low, high, start, slope_low, slope_high, kSteps);
+  }
+
+  // A block of cells at once, else its parts.
+  void Divide(const std::vector<int>& from, int size) {
+    const Grid cells = CellGrid();
+    const VecX low = cells.Point(from), high = low + size * cells.step;
+    if (size == 1) {
+      if (!DivideCell(from, low, high, 0)) failed_[static_cast<size_t>(cells.Index(from))] = true;
+      return;
+    }
+    if (auto cell = Prove(low, high)) {
+      leaves_.push_back({low, high, *std::move(cell), from, size});
+      return;
+    }
+    for (int part = 0; part < (1 << from.size()); ++part) {
+      std::vector<int> at = from;
+      for (size_t k = 0; k < at.size(); ++k) at[k] += ((part >> k) & 1) * size / 2;
+      Divide(at, size / 2);
+    }
+  }
+  bool DivideCell(const std::vector<int>& cell, const VecX& low, const VecX& high, int splits) {
+    if (auto proved = Prove(low, high)) {
+      leaves_.push_back({low, high, *std::move(proved), cell, 1});
+      return true;
+    }
+    if (splits == kSplits) return false;
+    const VecX half = 0.5 * (high - low);
+    for (int part = 0; part < (1 << cell.size()); ++part) {
+      VecX from = low;
+      for (Eigen::Index k = 0; k < from.size(); ++k) from[k] += ((part >> k) & 1) * half[k];
+      if (!DivideCell(cell, from, from + half, splits + 1)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool SameAt(const VecX& q, const Leaf& a, const Leaf& b) {
+    VecX here = a.cell.centre, there = b.cell.centre;
+    return finder_.Find(q, &here) && finder_.Find(q, &there) &&
+           (here - there).cwiseAbs().maxCoeff() <= kSameSolution;
+  }
+  // The middle of a common face.
+  static std::optional<VecX> FaceOf(const Leaf& a, const Leaf& b, const VecX& rounding) {
+    const VecX low = a.low.cwiseMax(b.low), high = a.high.cwiseMin(b.high);
+    int flat = 0;
+    for (Eigen::Index k = 0; k < low.size(); ++k) {
+      const double width = high[k] - low[k];
+      if (width < -rounding[k]) return std::nullopt;
+      flat += width <= rounding[k] ? 1 : 0;
+    }
+    if (flat != 1) return std::nullopt;
+    return VecX(0.5 * (low + high));
+  }
+
+  // Cells of a leaf, and `around` more to each side.
+  [[nodiscard]] std::vector<size_t> CellsOf(const Leaf& leaf, int around) const {
+    std::vector<size_t> cells = {0};
+    for (size_t k = 0; k < f_.size(); ++k) {
+      const int from = std::max(0, leaf.from[k] - around);
+      const int to = std::min(table_.cells[k], leaf.from[k] + leaf.size + around);
+      std::vector<size_t> longer;
+      for (const size_t cell : cells) {
+        for (int at = from; at < to; ++at) {
+          longer.push_back(cell * static_cast<size_t>(table_.cells[k]) + static_cast<size_t>(at));
+        }
+      }
+      cells = std::move(longer);
+    }
+    return cells;
+  }
+  [[nodiscard]] std::vector<size_t> Around(const Leaf& leaf,
+                                           const std::vector<std::vector<size_t>>& in_cell) const {
+    std::vector<size_t> around;
+    for (const size_t cell : CellsOf(leaf, 1)) {
+      around.insert(around.end(), in_cell[cell].begin(), in_cell[cell].end());
+    }
+    std::ranges::sort(around);
+    around.erase(std::unique(around.begin(), around.end()), around.end());
+    return around;
+  }
+
+  // The branch of home: from the leaf nearest to it over common faces.
+  void Connect() {
+    const Grid cells = CellGrid();
+    const VecX rounding = 1e-9 * cells.step;
+    double distance = std::numeric_limits<double>::infinity();
+    size_t first = leaves_.size();
+    for (size_t i = 0; i < leaves_.size(); ++i) {
+      const VecX middle = 0.5 * (leaves_[i].low + leaves_[i].high);
+      const double to = (middle - f_.closure.home).cwiseQuotient(cells.step).norm();
+      if (to >= distance) continue;
+      VecX x = f_.x_home;
+      if (!finder_.Walk(f_.closure.home, middle, kLongWay, &x)) continue;
+      if ((x - leaves_[i].cell.centre).cwiseAbs().maxCoeff() > kSameSolution) continue;
+      distance = to, first = i;
+    }
+    std::vector<std::vector<size_t>> in_cell(static_cast<size_t>(cells.size()));
+    for (size_t i = 0; i < leaves_.size(); ++i) {
+      for (const size_t cell : CellsOf(leaves_[i], 0)) in_cell[cell].push_back(i);
+    }
+    std::vector<bool> reached(leaves_.size(), false);
+    std::vector<size_t> next;
+    if (first < leaves_.size()) next.push_back(first), reached[first] = true;
+    while (!next.empty()) {
+      const size_t i = next.back();
+      next.pop_back();
+      for (const size_t j : Around(leaves_[i], in_cell)) {
+        if (reached[j]) continue;
+        const auto face = FaceOf(leaves_[i], leaves_[j], rounding);
+        if (!face || !SameAt(*face, leaves_[i], leaves_[j])) continue;
+        reached[j] = true;
+        next.push_back(j);
+      }
+    }
+    table_.proved.assign(static_cast<size_t>(cells.size()), false);
+    std::vector<bool> lost = failed_;
+    table_.bound = 0.0;
+    for (size_t i = 0; i < leaves_.size(); ++i) {
+      const Leaf& leaf = leaves_[i];
+      for (const size_t cell : CellsOf(leaf, 0)) {
+        table_.proved[cell] = true;
+        if (!reached[i]) lost[cell] = true;
+      }
+      if (reached[i]) table_.bound = std::max(table_.bound, leaf.cell.error);
+    }
+    for (size_t c = 0; c < lost.size(); ++c) table_.proved[c] = table_.proved[c] && !lost[c];
+  }
+
+  const MechanismFormulas& f_;
+  const VecX &low_, &high_;
+  PoseFinder finder_;
+  CellProver prover_;
+  const std::function<void(double)>& progress_;
+  StartTable table_;
+  std::vector<Leaf> leaves_;
+  std::vector<bool> failed_;  // per cell
+};
 
 }  // namespace
 
 StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low, const VecX& high,
                           std::string* why, const std::function<void(double)>& progress) {
   const size_t n = formulas.size();
-  StartTable table{.low = low, .high = high};
-  if (n > 3) {
-    *why = fmt::format("a table over {} coordinates would be large", n);
-    return table;
-  }
+  StartTable best{.low = low, .high = high};
+  if (n > 3) *why = fmt::format("one over {} coordinates would be large", n);
   for (const ClosureBlock& block : formulas.closure.blocks) {
     for (const int k : block.rates) {
       if (formulas.rates[static_cast<size_t>(k)].ball >= 0) {
@@ -551,139 +799,19 @@ StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low, co
                          block.rates.size());
     }
   }
-  if (!why->empty()) return table;
-  PoseFinder finder(formulas);
-  CellProver prover(formulas, &finder);
-  const std::array<int, 3> most_nodes = {33, 17, 9}, all_cells = {512, 64, 16};
-  StartTable best = table;
-  size_t best_count = 0;
-  for (int nodes = 5; nodes <= most_nodes[n - 1]; nodes = 2 * nodes - 1) {
-    table.nodes.assign(n, nodes);
-    table.cells.assign(n, all_cells[n - 1]);
-    table.steps = 3;
-    const Grid grid(table.nodes, low, high);
-    const std::vector<std::optional<VecX>> poses = PosesAt(formulas, &finder, grid);
-    table.x = MatX(grid.size(), formulas.x_home.size());
-    for (int i = 0; i < grid.size(); ++i) {
-      // Out of reach: as the nearest node that is not.
-      const VecX* pose = &formulas.x_home;
-      if (poses[static_cast<size_t>(i)]) {
-        pose = &*poses[static_cast<size_t>(i)];
-      } else {
-        double distance = std::numeric_limits<double>::infinity();
-        for (int j = 0; j < grid.size(); ++j) {
-          if (!poses[static_cast<size_t>(j)]) continue;
-          const double to =
-              (grid.Point(grid.At(i)) - grid.Point(grid.At(j))).cwiseQuotient(grid.step).norm();
-          if (to < distance) distance = to, pose = &*poses[static_cast<size_t>(j)];
-        }
-      }
-      table.x.row(i) = pose->unaryExpr(&Printed).transpose();
-    }
-    const VecX width = (high - low) / all_cells[n - 1];
-    std::vector<int> points(n, all_cells[n - 1] + 1);
-    std::vector<int> counts(n, all_cells[n - 1]);
-    Grid cells(points, low, high);
-    cells.counts = counts;
-    std::vector<std::optional<ProvedCell>> proved(static_cast<size_t>(cells.size()));
-    for (int c = 0; c < cells.size(); ++c) {
-      const VecX from = cells.Point(cells.At(c)), to = from + width;
-      // The table at the centre and its slopes at the corners of the cell.
-      const auto interpolate = [&](const VecX& q, MatX* slopes) {
-        std::vector<int> first(n);
-        VecX part(static_cast<Eigen::Index>(n));
-        for (size_t k = 0; k < n; ++k) {
-          const auto at = static_cast<Eigen::Index>(k);
-          const double t = (0.5 * (from[at] + to[at]) - low[at]) / grid.step[at];
-          first[k] = std::clamp(static_cast<int>(t), 0, nodes - 2);
-          part[at] = (q[at] - low[at]) / grid.step[at] - first[k];
-        }
-        VecX x = VecX::Zero(table.x.cols());
-        if (slopes != nullptr) *slopes = MatX::Zero(table.x.cols(), static_cast<Eigen::Index>(n));
-        for (int corner = 0; corner < (1 << n); ++corner) {
-          std::vector<int> at = first;
-          for (size_t k = 0; k < n; ++k) at[k] += (corner >> k) & 1;
-          const VecX node = table.x.row(grid.Index(at)).transpose();
-          const auto weight = [&](size_t k) {
-            const double p = part[static_cast<Eigen::Index>(k)];
-            return ((corner >> k) & 1) != 0 ? p : 1.0 - p;
-          };
-          double all = 1.0;
-          for (size_t k = 0; k < n; ++k) all *= weight(k);
-          x += all * node;
-          for (size_t k = 0; k < n && slopes != nullptr; ++k) {
-            double others = ((corner >> k) & 1) != 0 ? 1.0 : -1.0;
-            for (size_t j = 0; j < n; ++j) others *= j == k ? 1.0 : weight(j);
-            slopes->col(static_cast<Eigen::Index>(k)) +=
-                others / grid.step[static_cast<Eigen::Index>(k)] * node;
-          }
-        }
-        return x;
-      };
-      MatX slope_low, slope_high;
-      for (int corner = 0; corner < (1 << n); ++corner) {
-        VecX q = from;
-        for (size_t k = 0; k < n; ++k) {
-          if (((corner >> k) & 1) != 0)
-            q[static_cast<Eigen::Index>(k)] = to[static_cast<Eigen::Index>(k)];
-        }
-        MatX slopes;
-        (void)interpolate(q, &slopes);
-        slope_low = corner == 0 ? slopes : slope_low.cwiseMin(slopes).eval();
-        slope_high = corner == 0 ? slopes : slope_high.cwiseMax(slopes).eval();
-      }
-      VecX start = interpolate(0.5 * (from + to), nullptr);
-      finder.Place(0.5 * (from + to), &start);
-      proved[static_cast<size_t>(c)] =
-          prover.Prove(from, to, start, slope_low, slope_high, table.steps);
-      if (progress && c % 64 == 0) progress(static_cast<double>(c) / cells.size());
-    }
-    // The branch of home: from the cell nearest to it over common faces.
-    std::vector<bool> connected(proved.size(), false);
-    double distance = std::numeric_limits<double>::infinity();
-    int first = -1;
-    for (int c = 0; c < cells.size(); ++c) {
-      if (!proved[static_cast<size_t>(c)]) continue;
-      const VecX middle = cells.Point(cells.At(c)) + 0.5 * width;
-      const double to = (middle - formulas.closure.home).cwiseQuotient(width).norm();
-      if (to >= distance) continue;
-      VecX x = formulas.x_home;
-      if (!finder.Walk(formulas.closure.home, middle, 64, &x)) continue;
-      if ((x - proved[static_cast<size_t>(c)]->centre).cwiseAbs().maxCoeff() > 1e-7) continue;
-      distance = to, first = c;
-    }
-    table.bound = 0.0;
-    size_t count = 0;
-    if (first >= 0) {
-      std::deque<int> next = {first};
-      connected[static_cast<size_t>(first)] = true;
-      while (!next.empty()) {
-        const int from = next.front();
-        next.pop_front();
-        const ProvedCell& cell = *proved[static_cast<size_t>(from)];
-        table.bound = std::max(table.bound, cell.error);
-        ++count;
-        for (const int to : cells.Beside(from)) {
-          const auto t = static_cast<size_t>(to);
-          if (connected[t] || !proved[t]) continue;
-          const VecX face =
-              0.5 * (cells.Point(cells.At(from)) + cells.Point(cells.At(to))) + 0.5 * width;
-          VecX here = cell.centre, there = proved[t]->centre;
-          if (!finder.Find(face, &here) || !finder.Find(face, &there)) continue;
-          if ((here - there).cwiseAbs().maxCoeff() > 1e-7) continue;
-          connected[t] = true;
-          next.push_back(to);
-        }
-      }
-    }
-    table.proved = connected;
-    // A finer table is worth it where it proves clearly more.
-    if (count > best_count + best_count / 100 || best.proved.empty()) {
-      best = table;
-      best_count = count;
-    } else {
-      break;
-    }
+  if (!why->empty()) return best;
+  // A finer table is worth it where it proves clearly more.
+  constexpr std::array<int, 3> kMostNodes = {33, 17, 9}, kCells = {512, 64, 16};
+  constexpr double kWorth = 1.02;
+  TableMaker maker(formulas, low, high, progress);
+  const auto count = [](const StartTable& table) {
+    return static_cast<double>(std::ranges::count(table.proved, true));
+  };
+  for (int nodes = 5; nodes <= kMostNodes[n - 1]; nodes = 2 * nodes - 1) {
+    StartTable table = maker.Make(nodes, kCells[n - 1]);
+    const bool better = count(table) > kWorth * count(best);
+    if (better || best.proved.empty()) best = std::move(table);
+    if (!better && count(best) > 0.0) break;
   }
   return best;
 }
