@@ -20,7 +20,7 @@ class Interval {
   using Protected = boost::numeric::interval<
       double, boost::numeric::interval_lib::policies<
                   boost::numeric::interval_lib::save_state<
-                      boost::numeric::interval_lib::rounded_transc_std<double>>,
+                      boost::numeric::interval_lib::rounded_transc_opp<double>>,
                   boost::numeric::interval_lib::checking_base<double>>>;
   using Base = boost::numeric::interval_lib::unprotect<Protected>::type;
   using Guard = Protected::traits_type::rounding;
@@ -47,8 +47,8 @@ class Interval {
     if (!(a.low() >= 0.0)) return All();
     return Interval(boost::numeric::sqrt(a.in_));
   }
-  friend Interval sin(const Interval& a) { return Within(boost::numeric::sin(a.in_), a); }
-  friend Interval cos(const Interval& a) { return Within(boost::numeric::cos(a.in_), a); }
+  friend Interval sin(const Interval& a) { return Wave(a, std::sin(a.low()), std::sin(a.high()), 0.5); }
+  friend Interval cos(const Interval& a) { return Wave(a, std::cos(a.low()), std::cos(a.high()), 0.0); }
   // No row of a loop has these.
   friend Interval exp(const Interval& /*a*/) { return All(); }
   friend Interval atan2(const Interval& /*a*/, const Interval& /*b*/) { return All(); }
@@ -56,10 +56,18 @@ class Interval {
  private:
   explicit Interval(const Base& in) : in_(in) {}
   static Interval All() { return Interval(Base::whole()); }
-  static Interval Within(const Base& in, const Interval& of) {
-    constexpr double kLibrary = 8.0 * kEps;
-    if (!(of.magnitude() < 1e3)) return {-1.0, 1.0};
-    return {std::max(-1.0, in.lower() - kLibrary), std::min(1.0, in.upper() + kLibrary)};
+  // Sine or cosine, from its values at the ends; it has extremes at (k + shift) π, with the sign of
+  // even and odd k.
+  static Interval Wave(const Interval& a, double at_low, double at_high, double shift) {
+    constexpr double kLibrary = 8.0 * kEps, kBeside = 1e-12;
+    if (!(a.magnitude() < 1e3)) return {-1.0, 1.0};
+    double low = std::min(at_low, at_high) - kLibrary, high = std::max(at_low, at_high) + kLibrary;
+    const double first = std::ceil(a.low() / M_PI - shift - kBeside);
+    const double last = std::floor(a.high() / M_PI - shift + kBeside);
+    for (double k = first; k <= last; k += 1.0) {
+      (std::fmod(std::abs(k), 2.0) == 0.0 ? high : low) = std::fmod(std::abs(k), 2.0) == 0.0 ? 1.0 : -1.0;
+    }
+    return {std::max(-1.0, low), std::min(1.0, high)};
   }
   Base in_;
 };
