@@ -298,11 +298,13 @@ class CodeMaker {
 }  // namespace
 
 bool CodeJudgement::agrees() const {
-  const auto within = [](double difference) {
-    return std::isnan(difference) || difference <= kLimit;
-  };
-  return not_judged.empty() && states > 0 && position <= kLimit && within(force) &&
-         within(jacobian) && static_cast<double>(only_one) <= 0.01 * static_cast<double>(states);
+  bool any = false, within = true;
+  for (const double difference : {position, jacobian, force, along, output}) {
+    any = any || !std::isnan(difference);
+    within = within && (std::isnan(difference) || difference <= kLimit);
+  }
+  return not_judged.empty() && states > 0 && any && within &&
+         static_cast<double>(only_one) <= 0.01 * static_cast<double>(states);
 }
 
 bool CodeResult::agrees() const {

@@ -36,7 +36,10 @@ struct CodeJudgement {
   size_t states = 0;            ///< that both reached
   size_t only_one = 0;          ///< that one of them reached
   double position = kNan;       ///< largest difference, by the largest value of its actuator
-  double force = kNan;          ///< NaN: no forces
+  double force = kNan;          ///< of actuators; NaN: there are none
+  double along = kNan;          ///< of forces along the coordinates
+  double output = kNan;         ///< of the outputs' poses [m, rad], as they are
+  double back = kNan;           ///< share of the states that the way by actuators leads back to
   double jacobian = kNan;       ///< by the largest entry
   double nanoseconds = kNan;    ///< per state: pose, Jacobian and forces
   std::string slip = {};        ///< what is wrong, where that is found out
@@ -64,6 +67,10 @@ struct CodeTask {
   std::vector<NamedCoordinate> coordinates;  ///< q
   std::vector<NamedCoordinate> held;         ///< at home
   std::vector<NamedCoordinate> actuators;    ///< drives and prescribed joints
+  /// The mechanism is a part of `whole`, and the forces of another part, `given`, along the
+  /// coordinates are inputs: together they need the actuators' forces of the whole.
+  const Mechanism* whole = nullptr;
+  const Mechanism* given = nullptr;
 };
 
 /// By names; the rest of `settings` is of no influence. Nothing after an error.

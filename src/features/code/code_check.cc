@@ -45,7 +45,13 @@ std::vector<Coordinate> AllOf(const CodeTask& task) {
 }  // namespace
 
 CodeReference::CodeReference(const Mechanism& mechanism, const CodeTask& task)
-    : mechanism_(mechanism), task_(task), model_(mechanism, AllOf(task)) {
+    : mechanism_(mechanism),
+      task_(task),
+      model_(task.whole != nullptr ? *task.whole : mechanism, AllOf(task)) {
+  if (task.whole != nullptr) {
+    own_.emplace(mechanism, AllOf(task));
+    given_.emplace(*task.given, AllOf(task));
+  }
   held_ = model_.home().tail(static_cast<Eigen::Index>(task.held.size()));
 }
 
@@ -69,9 +75,27 @@ bool CodeReference::Find(TestState* state, std::string* why) {
   state->rates = chosen(driven.velocity);
   state->accelerations = chosen(driven.acceleration);
   state->forces.resize(0);
+  const MatX& outputs = model_.sample().outputs;
+  state->outputs.resize(outputs.size());
+  for (Eigen::Index o = 0; o < outputs.rows(); ++o) {
+    state->outputs.segment<6>(6 * o) = outputs.row(o).transpose();
+  }
+  const auto along = [&](ReducedModel* model, VecX* forces) {
+    MatX T;
+    if (model != &model_) {
+      model->Restart();
+      summary = model->Move(q, v, a);
+    }
+    if (summary.ok()) summary = model->Motions(&T);
+    if (summary.ok()) *forces = model->Forces(T, {}).head(n);
+    return !failed();
+  };
+  state->more = VecX::Zero(n);
+  if (!along(own_ ? &*own_ : &model_, &state->along)) return false;
+  if (given_ && !along(&*given_, &state->more)) return false;
   if (task_.actuators.size() != task_.coordinates.size()) return true;
   summary = model_.AllForces({});
-  if (summary.ok()) {
+  if (summary.ok() && !given_) {
     VecX forces(driven.position.size());
     forces << model_.sample().drive_force, model_.sample().prescribed_force;
     state->forces = chosen(forces);
@@ -81,7 +105,6 @@ bool CodeReference::Find(TestState* state, std::string* why) {
   MatX T;
   summary = model_.Motions(&T);
   if (failed()) return false;
-  const VecX f = model_.Forces(T, {}).head(n);
   const MatX rates = model_.DriveRates(T);
   MatX J(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -94,7 +117,7 @@ bool CodeReference::Find(TestState* state, std::string* why) {
     *why = "the actuators do not hold the coordinates";
     return false;
   }
-  state->forces = qr.solve(f);
+  state->forces = qr.solve(state->along + state->more);
   return true;
 }
 
@@ -126,8 +149,7 @@ std::string CheckProgram(const MechanismFormulas& formulas, const CodeTextOption
 #include <time.h>
 
 int main(int argc, char** argv) {
-  double s[3 * @_N], d[@_ACTUATORS + 1], dd[@_ACTUATORS + 1], ddd[@_ACTUATORS + 1];
-  double tau[@_ACTUATORS + @_N], sum = 0.0, count = 0.0;
+  double s[4 * @_N], row[1 + 4 * @_ACTUATORS + @_N + OUTPUTS + 1], sum = 0.0, count = 0.0;
   clock_t began;
   FILE *in, *out;
   @_pose p, home;
@@ -140,27 +162,26 @@ int main(int argc, char** argv) {
   out = fopen(argv[2], "wb");
   if (in == 0 || out == 0 || @_home(&home) != @_OK) return 2;
   while (fread(s, sizeof s, 1, in) == 1) {
-    double status;
+    double* at = row + 1;
+    memset(row, 0, sizeof row);
     p = home;
-    status = FIND;
-    memset(d, 0, sizeof d);
-    memset(dd, 0, sizeof dd);
-    memset(ddd, 0, sizeof ddd);
-    memset(tau, 0, sizeof tau);
-    if (status == @_OK) {
-      @_actuators(&p, d);
-      @_actuator_motion(&p, s + @_N, s + 2 * @_N, dd, ddd);
-      status = FORCES;
+    row[0] = FIND;
+    if (row[0] == @_OK) {
+      @_actuators(&p, at);
+      @_actuator_motion(&p, s + @_N, s + 2 * @_N, at + @_ACTUATORS, at + 2 * @_ACTUATORS);
+      row[0] = FORCES(at + 3 * @_ACTUATORS);
+      at += 4 * @_ACTUATORS;
+      ALONG
+      at += @_N;
+      POSES
+      at += OUTPUTS;
+      BACK
     }
-    fwrite(&status, sizeof status, 1, out);
-    fwrite(d, sizeof(double), @_ACTUATORS, out);
-    fwrite(dd, sizeof(double), @_ACTUATORS, out);
-    fwrite(ddd, sizeof(double), @_ACTUATORS, out);
-    fwrite(tau, sizeof(double), @_ACTUATORS, out);
+    fwrite(row, sizeof row, 1, out);
   }
-  p = home;
   rewind(in);
   began = clock();
+  p = home;
   while (count < 2e5) {
     if (fread(s, sizeof s, 1, in) != 1) {
       rewind(in);
@@ -168,7 +189,7 @@ int main(int argc, char** argv) {
       continue;
     }
     count += 1.0;
-    if (FIND == @_OK && FORCES == @_OK) sum += tau[0];
+    if (FIND == @_OK && FORCES(row) == @_OK) sum += row[0];
     if (count >= 1e4 && clock() - began > CLOCKS_PER_SEC) break;
   }
   printf("%g %g\n", (double)(clock() - began) / CLOCKS_PER_SEC / (count > 0.0 ? count : 1.0), sum);
@@ -188,7 +209,29 @@ int main(int argc, char** argv) {
     return worst <= 1e-9 ? 0 : 1;)code"
                              : "return 0; /* no forces to compare */");
   replace("FIND", options.table ? "table ? @_at(&p, s) : @_close(&p, s)" : "@_close(&p, s)");
-  replace("FORCES", square ? "@_inverse_dynamics(&p, s + @_N, s + 2 * @_N, 0, tau)" : "@_OK");
+  std::string poses, back;
+  for (size_t o = 0; o < formulas.outputs.size(); ++o) {
+    poses += fmt::format("@_pose_{}(&p, at + {});", o, 6 * o);
+  }
+  if (formulas.from_actuators) {
+    back =
+        "{ @_pose b = home; int k;\n        *at = @_close_by_actuators(&b, row + 1) == @_OK ? 0.0 "
+        ": 1e300;\n"
+        "        for (k = 0; k < @_N; ++k) {\n"
+        "          if (!(fabs(b.q[k] - s[k]) <= *at)) *at = fabs(b.q[k] - s[k]);\n        }\n      "
+        "}";
+  }
+  // Forces of actuators into an array.
+  for (const char* into : {"at + 3 * @_ACTUATORS", "row"}) {
+    replace(fmt::format("FORCES({})", into),
+            square
+                ? fmt::format("@_inverse_dynamics(&p, s + @_N, s + 2 * @_N, s + 3 * @_N, {})", into)
+                : "@_OK");
+  }
+  replace("ALONG", formulas.forces.empty() ? "" : "@_forces(&p, s + @_N, s + 2 * @_N, at);");
+  replace("POSES", poses);
+  replace("BACK", back);
+  replace("OUTPUTS", std::to_string(6 * formulas.outputs.size()));
   if (!options.table) replace("  table = argc > 3 && strcmp(argv[3], \"table\") == 0;\n", "");
   if (!options.table) replace("  int table;\n", "");
   replace("@", options.name);
@@ -204,7 +247,9 @@ std::string CodeCheck::Run(const std::vector<std::string>& argv,
                            CodeJudgement* judgement) {
   std::string bytes;
   const auto add = [&](const TestState& state) {
-    for (const VecX* part : {&state.q, &state.v, &state.a}) {
+    VecX more = state.more;
+    if (more.size() == 0) more = VecX::Zero(state.q.size());
+    for (const VecX* part : {&state.q, &state.v, &state.a, &static_cast<const VecX&>(more)}) {
       bytes.append(reinterpret_cast<const char*>(part->data()),  // NOLINT: numbers as they are
                    sizeof(double) * static_cast<size_t>(part->size()));
     }
@@ -222,17 +267,20 @@ std::string CodeCheck::Run(const std::vector<std::string>& argv,
   if (end.exit_code != 0) return fmt::format("ended with code {}: {}", end.exit_code, log);
   const std::optional<std::string> values = ReadWholeFile(folder / "values");
   const auto m = static_cast<Eigen::Index>(formulas_.actuators.size());
-  const size_t size = sizeof(double) * static_cast<size_t>(1 + 4 * m);
+  const auto n = static_cast<Eigen::Index>(formulas_.size());
+  const auto o = static_cast<Eigen::Index>(6 * formulas_.outputs.size());
+  std::vector<double> row(static_cast<size_t>(1 + 4 * m + n + o + 1));
+  const size_t size = sizeof(double) * row.size();
   if (!values || values->size() != size * (count + open)) return "has not computed all states";
   judgement->nanoseconds = 1e9 * std::strtod(log.c_str(), nullptr);
   found_.clear();
   compared_ = count;
-  std::vector<double> row(static_cast<size_t>(1 + 4 * m));
   for (size_t i = 0; i < count + open; ++i) {
     std::memcpy(row.data(), values->data() + i * size, size);
-    const Eigen::Map<const VecX> all(row.data() + 1, 4 * m);
-    found_.push_back(
-        {row[0] == 0.0, all.head(m), all.segment(m, m), all.segment(2 * m, m), all.tail(m)});
+    const Eigen::Map<const VecX> all(row.data() + 1, 4 * m + n + o + 1);
+    found_.push_back({row[0] == 0.0, all.head(m), all.segment(m, m), all.segment(2 * m, m),
+                      all.segment(3 * m, m), all.segment(4 * m, n), all.segment(4 * m + n, o),
+                      formulas_.from_actuators ? row.back() : kNan});
   }
   return "";
 }
@@ -305,27 +353,38 @@ CodeJudgement CodeCheck::Python(const std::string& module, size_t most) {
   judgement.not_judged = folder.trouble();
   if (!judgement.not_judged.empty()) return judgement;
   const bool square = formulas_.actuators.size() == formulas_.size() && !formulas_.forces.empty();
+  std::string poses;
+  for (size_t o = 0; o < formulas_.outputs.size(); ++o) {
+    poses += fmt::format("{}code.pose_{}(p)", o == 0 ? "" : " + ", o);
+  }
   const std::string program =
       fmt::format(R"code(import struct, sys, time
 sys.path.insert(0, ".")
 import {0} as code
 data = open("states", "rb").read()
-size, m = 3 * code.N, code.ACTUATORS
+size, m = 4 * code.N, code.ACTUATORS
 values, began, count = open("values", "wb"), time.perf_counter(), 0
 for at in range(0, len(data), 8 * size):
     s = struct.unpack_from("%dd" % size, data, at)
-    q, v, a = s[:code.N], s[code.N:2 * code.N], s[2 * code.N:]
+    q, v, a, more = (s[k * code.N:(k + 1) * code.N] for k in range(4))
     p = code.Pose()
-    row = [float(code.close(p, q))] + [0.0] * (4 * m)
+    row = [float(code.close(p, q))] + [0.0] * (4 * m + code.N + {2} + 1)
     count += 1
     if row[0] == code.OK:
         dd, ddd = code.actuator_motion(p, v, a)
         tau = {1}
-        row = [0.0 if tau is not None else 2.0] + code.actuators(p) + dd + ddd + (tau or [0.0] * m)
+        back, way = {4}, 1e300
+        if back is not None and code.close_by_actuators(back, code.actuators(p)) == code.OK:
+            way = max(abs(x - y) for x, y in zip(back.q, q))
+        row = ([0.0 if tau is not None else 2.0] + code.actuators(p) + dd + ddd + (tau or [0.0] * m)
+               + {3} + {5} + [way])
     values.write(struct.pack("%dd" % len(row), *row))
 print((time.perf_counter() - began) / max(1, count))
 )code",
-                  options_.name, square ? "code.inverse_dynamics(p, v, a)" : "[0.0] * m");
+                  options_.name, square ? "code.inverse_dynamics(p, v, a, more)" : "[0.0] * m",
+                  6 * formulas_.outputs.size(),
+                  formulas_.forces.empty() ? "[0.0] * code.N" : "code.forces(p, v, a)",
+                  formulas_.from_actuators ? "code.Pose()" : "None", poses.empty() ? "[]" : poses);
   if (!WriteFile(folder.path() / (options_.name + ".py"), module).empty() ||
       !WriteFile(folder.path() / "run.py", program).empty()) {
     judgement.not_judged = "temporary files cannot be written";
@@ -338,48 +397,60 @@ print((time.perf_counter() - began) / max(1, count))
 }
 
 void CodeCheck::Compare(CodeJudgement* judgement) const {
-  const auto m = static_cast<Eigen::Index>(formulas_.actuators.size());
-  const bool forces =
-      !states_.empty() && states_[0].forces.size() == m && !formulas_.forces.empty();
-  // Per actuator: of positions, rates, accelerations, forces.
-  std::array<VecX, 4> worst, largest;
-  for (size_t part = 0; part < 4; ++part) worst[part] = largest[part] = VecX::Zero(m);
+  // Positions, rates, accelerations and forces of actuators, forces along coordinates.
+  constexpr size_t kParts = 5;
+  const auto parts_of = [](const auto& of) {
+    return std::array<const VecX*, kParts>{&of.actuators, &of.rates, &of.accelerations, &of.forces,
+                                           &of.along};
+  };
+  std::array<VecX, kParts> worst, largest;
+  size_t back = 0;
+  double output = 0.0;
   for (size_t i = 0; i < found_.size(); ++i) {
     const Found& found = found_[i];
-    if (i >= compared_) {
-      judgement->only_one += found.reached ? 1 : 0;
-      continue;
-    }
-    if (!found.reached) {
-      ++judgement->only_one;
+    if (i >= compared_ || !found.reached) {
+      judgement->only_one += found.reached || i < compared_ ? 1 : 0;
       continue;
     }
     ++judgement->states;
     const TestState& state = states_[i];
-    const std::array<const VecX*, 4> has = {&found.actuators, &found.rates, &found.accelerations,
-                                            &found.forces};
-    const std::array<const VecX*, 4> should = {&state.actuators, &state.rates, &state.accelerations,
-                                               &state.forces};
-    for (size_t part = 0; part < (forces ? 4U : 3U); ++part) {
+    const auto has = parts_of(found), should = parts_of(state);
+    for (size_t part = 0; part < kParts; ++part) {
+      if (worst[part].size() == 0) worst[part] = largest[part] = VecX::Zero(should[part]->size());
+      if (should[part]->size() == 0) continue;
       worst[part] = worst[part].cwiseMax((*has[part] - *should[part]).cwiseAbs());
       largest[part] = largest[part].cwiseMax(should[part]->cwiseAbs());
+      if (!has[part]->allFinite()) worst[part].setConstant(std::numeric_limits<double>::infinity());
     }
+    for (Eigen::Index k = 0; k < state.outputs.size(); ++k) {
+      double off = found.outputs[k] - state.outputs[k];
+      if (k % 6 > 2) off = std::remainder(off, 2.0 * M_PI);
+      if (!(std::abs(off) <= output)) output = std::abs(off);
+    }
+    back += found.back <= CodeJudgement::kLimit ? 1 : 0;
   }
-  // By the largest value of all actuators of the same unit would hide a small one: by its own, but
-  // not below rounding of the others.
+  if (judgement->states == 0) return;
+  // By the largest value of its own, but not below rounding of the others.
   const auto relative = [&](size_t part) {
+    if (worst[part].size() == 0) return kNan;
     double most = 0.0;
     const double floor = 1e-6 * largest[part].maxCoeff();
-    for (Eigen::Index k = 0; k < m; ++k) {
+    for (Eigen::Index k = 0; k < worst[part].size(); ++k) {
       const double scale = std::max(largest[part][k], floor);
-      if (scale > 0.0) most = std::max(most, worst[part][k] / scale);
+      if (worst[part][k] > 0.0) most = std::max(most, worst[part][k] / scale);
     }
     return most;
   };
-  if (judgement->states == 0 || m == 0) return;
   judgement->position = relative(0);
   judgement->jacobian = std::max(relative(1), relative(2));
-  if (forces) judgement->force = relative(3);
+  if (!formulas_.forces.empty()) {
+    judgement->force = relative(3);
+    judgement->along = relative(4);
+  }
+  if (!formulas_.outputs.empty()) judgement->output = output;
+  if (formulas_.from_actuators) {
+    judgement->back = static_cast<double>(back) / static_cast<double>(judgement->states);
+  }
 }
 
 std::string CodeCheck::Slip(CodeReference* reference) const {

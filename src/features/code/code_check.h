@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ class CodeReference {
  private:
   const Mechanism& mechanism_;
   const CodeTask& task_;
-  ReducedModel model_;
+  ReducedModel model_;                       ///< of the whole
+  std::optional<ReducedModel> own_, given_;  ///< of the parts
   VecX held_;
 };
 
@@ -50,7 +52,8 @@ class CodeCheck {
  private:
   struct Found {
     bool reached = false;
-    VecX actuators, rates, accelerations, forces;
+    VecX actuators, rates, accelerations, forces, along, outputs;
+    double back = kNan;
   };
   [[nodiscard]] std::string Run(const std::vector<std::string>& argv,
                                 const std::filesystem::path& folder, size_t count,

@@ -38,16 +38,30 @@ std::string JudgementText(const CodeJudgement& judgement) {
     for (const std::string& line : judgement.warnings) text += "  " + OneLine(line) + "\n";
     return text;
   }
-  std::string text =
-      fmt::format("{}: {} at {} states: positions {:.2g}, rates and accelerations {:.2g}",
-                  judgement.language, judgement.agrees() ? "agrees" : "DIFFERS", judgement.states,
-                  judgement.position, judgement.jacobian);
-  if (!std::isnan(judgement.force)) text += fmt::format(", forces {:.2g}", judgement.force);
+  std::string text = fmt::format("{}: {} at {} states", judgement.language,
+                                 judgement.agrees() ? "agrees" : "DIFFERS", judgement.states);
+  const char* before = ": ";
+  const auto add = [&](const char* what, double difference) {
+    if (std::isnan(difference)) return;
+    text += fmt::format("{}{} {:.2g}", before, what, difference);
+    before = ", ";
+  };
+  add("positions", judgement.position);
+  add("rates and accelerations", judgement.jacobian);
+  add("forces", judgement.force);
+  add("forces along the coordinates", judgement.along);
+  add("outputs", judgement.output);
   text += fmt::format(" (limit {:.0e} of the largest value)", CodeJudgement::kLimit);
   if (!std::isnan(judgement.nanoseconds)) {
     text += fmt::format("; {:.3g} µs a state", 1e-3 * judgement.nanoseconds);
   }
   text += "\n";
+  if (judgement.back < 1.0) {
+    text += fmt::format(
+        "  the way back from the actuators' positions ends at the same coordinates in "
+        "{:.1f} % of the states, else in another assembly or nowhere\n",
+        100.0 * judgement.back);
+  }
   if (judgement.only_one > 0) {
     text += fmt::format("  {} states that only one of the two reaches\n", judgement.only_one);
   }
@@ -104,6 +118,9 @@ nlohmann::ordered_json CodeJson(const CodeResult& result, const std::string& mod
                                   {"position", NumberOrNull(one.position)},
                                   {"rates", NumberOrNull(one.jacobian)},
                                   {"force", NumberOrNull(one.force)},
+                                  {"along", NumberOrNull(one.along)},
+                                  {"output", NumberOrNull(one.output)},
+                                  {"back", NumberOrNull(one.back)},
                                   {"nanoseconds", NumberOrNull(one.nanoseconds)},
                                   {"slip", one.slip},
                                   {"warnings", one.warnings}});

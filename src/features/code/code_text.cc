@@ -826,7 +826,8 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
     std::string rows;
     for (const TestState& test : o_.tests) {
       std::vector<std::string> items;
-      for (const VecX* part : {&test.q, &test.v, &test.a, &test.actuators, &test.forces}) {
+      for (const VecX* part :
+           {&test.q, &test.v, &test.a, &test.more, &test.actuators, &test.forces}) {
         Append(Numbers(*part), &items);
       }
       rows +=
@@ -841,7 +842,8 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
         "the");
     Line(" * largest position and the largest force there; 1e300 where a state is not reached. */");
     Line("static inline double {}self_test(void) {{", prefix_);
-    Line("  static const double tests[][5 * {}N] = {{ /* q, v, a, positions, forces */", prefix_);
+    Line("  static const double tests[][6 * {}N] = {{ /* q, v, a, more, positions, forces */",
+         prefix_);
     text_ += TestRows("{", "}", "    ");
     Line("  }};");
     Line("  double worst[2] = {{0.0, 0.0}}, largest[2] = {{1e-300, 1e-300}};");
@@ -851,9 +853,9 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
     @pose p;
     if (@home(&p) != @OK || @close(&p, t) != @OK) return 1e300;
     @actuators(&p, d);
-    if (@inverse_dynamics(&p, t + @N, t + 2 * @N, 0, tau) != @OK) return 1e300;
+    if (@inverse_dynamics(&p, t + @N, t + 2 * @N, t + 3 * @N, tau) != @OK) return 1e300;
     for (k = 0; k < @N; ++k) {
-      const double position = t[3 * @N + k], force = t[4 * @N + k];
+      const double position = t[4 * @N + k], force = t[5 * @N + k];
       if (!(fabs(d[k] - position) <= worst[0])) worst[0] = fabs(d[k] - position);
       if (!(fabs(tau[k] - force) <= worst[1])) worst[1] = fabs(tau[k] - force);
       if (fabs(position) > largest[0]) largest[0] = fabs(position);
@@ -1121,7 +1123,7 @@ def inverse_dynamics(p, v, a, more=None):
   }
 
   void PythonSelfTest() {
-    Line("\n\n_TESTS = [  # q, v, a, positions, forces");
+    Line("\n\n_TESTS = [  # q, v, a, more, positions, forces");
     text_ += TestRows("[", "]", "    ");
     Fixed(R"code(]
 
@@ -1131,11 +1133,11 @@ def self_test():
     largest position and the largest force there; infinite where a state is not reached."""
     worst, largest = [0.0, 0.0], [1e-300, 1e-300]
     for test in _TESTS:
-        q, v, a, d, tau = (test[k * N:(k + 1) * N] for k in range(5))
+        q, v, a, more, d, tau = (test[k * N:(k + 1) * N] for k in range(6))
         p = Pose()
         if close(p, q) != OK:
             return float("inf")
-        found = inverse_dynamics(p, v, a)
+        found = inverse_dynamics(p, v, a, more)
         if found is None:
             return float("inf")
         for i, (has, wanted) in enumerate(((actuators(p), d), (found, tau))):

@@ -8,9 +8,14 @@
 
 namespace mbv {
 
-/// A state with what the reference finds there. Per coordinate, then per actuator.
+/// A state with what the reference finds there.
 struct TestState {
-  VecX q, v, a, actuators, forces, rates, accelerations;
+  VecX q, v, a;
+  VecX more;  ///< forces along the coordinates that are given beyond the mechanism's own
+  VecX actuators, rates, accelerations,
+      forces;    ///< per actuator; forces: none if they are no function
+  VecX along;    ///< forces along the coordinates, without `more`
+  VecX outputs;  ///< six each
 };
 
 /// Start values for Newton's method over a box of q, and where they are proved to do.

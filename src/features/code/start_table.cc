@@ -17,11 +17,12 @@ namespace {
 class Interval {
  public:
   // While a Guard lives, the processor rounds as these operations need it.
-  using Protected = boost::numeric::interval<
-      double, boost::numeric::interval_lib::policies<
-                  boost::numeric::interval_lib::save_state<
-                      boost::numeric::interval_lib::rounded_transc_opp<double>>,
-                  boost::numeric::interval_lib::checking_base<double>>>;
+  using Protected =
+      boost::numeric::interval<double,
+                               boost::numeric::interval_lib::policies<
+                                   boost::numeric::interval_lib::save_state<
+                                       boost::numeric::interval_lib::rounded_transc_opp<double>>,
+                                   boost::numeric::interval_lib::checking_base<double>>>;
   using Base = boost::numeric::interval_lib::unprotect<Protected>::type;
   using Guard = Protected::traits_type::rounding;
   Interval() = default;
@@ -47,8 +48,12 @@ class Interval {
     if (!(a.low() >= 0.0)) return All();
     return Interval(boost::numeric::sqrt(a.in_));
   }
-  friend Interval sin(const Interval& a) { return Wave(a, std::sin(a.low()), std::sin(a.high()), 0.5); }
-  friend Interval cos(const Interval& a) { return Wave(a, std::cos(a.low()), std::cos(a.high()), 0.0); }
+  friend Interval sin(const Interval& a) {
+    return Wave(a, std::sin(a.low()), std::sin(a.high()), 0.5);
+  }
+  friend Interval cos(const Interval& a) {
+    return Wave(a, std::cos(a.low()), std::cos(a.high()), 0.0);
+  }
   // No row of a loop has these.
   friend Interval exp(const Interval& /*a*/) { return All(); }
   friend Interval atan2(const Interval& /*a*/, const Interval& /*b*/) { return All(); }
@@ -65,7 +70,8 @@ class Interval {
     const double first = std::ceil(a.low() / M_PI - shift - kBeside);
     const double last = std::floor(a.high() / M_PI - shift + kBeside);
     for (double k = first; k <= last; k += 1.0) {
-      (std::fmod(std::abs(k), 2.0) == 0.0 ? high : low) = std::fmod(std::abs(k), 2.0) == 0.0 ? 1.0 : -1.0;
+      (std::fmod(std::abs(k), 2.0) == 0.0 ? high : low) =
+          std::fmod(std::abs(k), 2.0) == 0.0 ? 1.0 : -1.0;
     }
     return {std::max(-1.0, low), std::min(1.0, high)};
   }
@@ -75,7 +81,7 @@ class Interval {
 constexpr size_t kLargestBlock = 8;  // second derivatives grow with its cube
 constexpr double kConverged = 1e-12;
 constexpr double kSameSolution = 1e-7;
-constexpr int kLongWay = 64;  // steps of a walk
+constexpr int kLongWay = 64;      // steps of a walk
 constexpr double kBound = 1e-12;  // of the error that is left
 
 // Newton's method as the code does it.
@@ -383,14 +389,16 @@ class CellProver {
     const MatX A = lu.inverse();
     // ∂r/∂q along what is known, by interval arithmetic at the inputs.
     const auto along = [&] {
-      const std::vector<Interval> others = Evaluate(tapes_[b].others), by_q = Evaluate(tapes_[b].by_q);
+      const std::vector<Interval> others = Evaluate(tapes_[b].others),
+                                  by_q = Evaluate(tapes_[b].by_q);
       std::vector<Interval> sum(m * n);
       for (size_t i = 0; i < m; ++i) {
         for (size_t k = 0; k < n; ++k) {
           Interval& at = sum[i * n + k] = by_q[k * m + i];
           for (size_t j = 0; j < known; ++j) {
             const auto x = static_cast<Eigen::Index>(PlaceOf(block.known[j]));
-            at = at + others[i * known + j] * Interval(cell->slopes(x, static_cast<Eigen::Index>(k)));
+            at = at +
+                 others[i * known + j] * Interval(cell->slopes(x, static_cast<Eigen::Index>(k)));
           }
         }
       }
@@ -399,7 +407,8 @@ class CellProver {
     const std::vector<Interval> along_centre = along();
     for (size_t i = 0; i < m; ++i) {
       for (size_t k = 0; k < n; ++k) {
-        right(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = along_centre[i * n + k].low();
+        right(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+            along_centre[i * n + k].low();
       }
     }
     const MatX G = -A * right;  // scaled
@@ -417,7 +426,8 @@ class CellProver {
       std::vector<Interval> Av(m, Interval(0.0));
       for (size_t i = 0; i < m; ++i) {
         for (size_t j = 0; j < m; ++j) {
-          Av[i] = Av[i] + Interval(A(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))) * v[j];
+          Av[i] = Av[i] +
+                  Interval(A(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))) * v[j];
         }
       }
       return Av;
@@ -477,7 +487,8 @@ class CellProver {
           v[i] = v[i] + Interval(-most, most);
         }
       }
-      for (const Interval& part : times_A(v)) D = std::max(D, part.magnitude() / (1.0 - contraction));
+      for (const Interval& part : times_A(v))
+        D = std::max(D, part.magnitude() / (1.0 - contraction));
     }
     // (2)
     double error = 0.0;
@@ -502,7 +513,8 @@ class CellProver {
       double sum = 0.0;
       for (size_t k = 0; k < m; ++k) {
         for (size_t j = 0; j < m; ++j) {
-          sum += H[(k * m + i) * m + j].magnitude() * ScaleOf(block.rates[j]) * ScaleOf(block.rates[k]);
+          sum += H[(k * m + i) * m + j].magnitude() * ScaleOf(block.rates[j]) *
+                 ScaleOf(block.rates[k]);
         }
       }
       second = std::max(second, sum);
