@@ -71,6 +71,7 @@ class CodeMaker {
     result_.files = {{result_.name + ".h", header},
                      {result_.name + ".py", python},
                      {result_.name + "_test.c", CheckProgram(*formulas_, options_)}};
+    if (options_.table) AddLookup();
     if (settings_.compile) Judge(header, python);
     return std::move(result_);
   }
@@ -223,6 +224,22 @@ class CodeMaker {
     return false;
   }
 
+  void AddLookup() {
+    LookupTable table = MakeLookupTable(*formulas_, *options_.table);
+    result_.lookup_share = static_cast<double>(std::ranges::count(table.proved, true)) /
+                           static_cast<double>(table.proved.size());
+    result_.lookup_error = VecX::Zero(static_cast<Eigen::Index>(formulas_->actuators.size()));
+    VecX m;
+    MatX slopes;
+    for (const TestState& state : states_) {
+      if (!table.At(state.q, &m, &slopes)) continue;
+      result_.lookup_error = result_.lookup_error.cwiseMax((m - state.actuators).cwiseAbs());
+    }
+    result_.files.emplace_back(result_.name + "_lookup.h",
+                               LookupHeader(*formulas_, table, options_));
+    result_.lookup = std::move(table);
+  }
+
   void Head() {
     std::vector<std::string>& head = options_.heading;
     head.push_back(
@@ -295,7 +312,128 @@ class CodeMaker {
   std::vector<TestState> states_, open_;
 };
 
+nlohmann::ordered_json NumberOrNull(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+}
+
+std::string JudgementText(const CodeJudgement& judgement) {
+  if (!judgement.not_judged.empty()) {
+    std::string text =
+        fmt::format("{}: not judged: {}\n", judgement.language, judgement.not_judged);
+    for (const std::string& line : judgement.warnings) text += "  " + OneLine(line) + "\n";
+    return text;
+  }
+  std::string text = fmt::format("{}: {} at {} states", judgement.language,
+                                 judgement.agrees() ? "agrees" : "DIFFERS", judgement.states);
+  const char* before = ": ";
+  const auto add = [&](const char* what, double difference) {
+    if (std::isnan(difference)) return;
+    text += fmt::format("{}{} {:.2g}", before, what, difference);
+    before = ", ";
+  };
+  add("positions", judgement.position);
+  add("rates and accelerations", judgement.jacobian);
+  add("forces", judgement.force);
+  add("forces along the coordinates", judgement.along);
+  add("outputs", judgement.output);
+  text += fmt::format(" (limit {:.0e} of the largest value)", CodeJudgement::kLimit);
+  if (!std::isnan(judgement.nanoseconds)) {
+    text += fmt::format("; {:.3g} µs a state", 1e-3 * judgement.nanoseconds);
+  }
+  text += "\n";
+  if (judgement.back < 1.0) {
+    text += fmt::format(
+        "  the way back from the actuators' positions ends at the same coordinates in "
+        "{:.1f} % of the states, else in another assembly or nowhere\n",
+        100.0 * judgement.back);
+  }
+  if (judgement.only_one > 0) {
+    text += fmt::format("  {} states that only one of the two reaches\n", judgement.only_one);
+  }
+  if (!judgement.agrees()) {
+    text += judgement.slip.empty() ? "  no single slip explains it\n"
+                                   : "  what explains it: " + judgement.slip + "\n";
+  }
+  for (const std::string& line : judgement.warnings) text += "  " + OneLine(line) + "\n";
+  return text;
+}
+
 }  // namespace
+
+std::string JudgementsText(const CodeResult& result) {
+  std::string text;
+  for (const CodeJudgement& judgement : result.judgements) text += JudgementText(judgement);
+  return text;
+}
+
+std::string ToText(const CodeResult& result) {
+  std::string text = fmt::format("coordinates: {}\nactuators: {}\n", Joined(result.coordinates),
+                                 Joined(result.actuators));
+  text += result.blocks == 0
+              ? "the joints follow from the coordinates without equations to solve\n"
+              : fmt::format("{} joints' coordinates are searched, in {} blocks of at most {}\n",
+                            result.unknowns, result.blocks, result.largest_block);
+  for (const std::string& note : result.notes) text += note + "\n";
+  if (!std::isnan(result.table_bound)) {
+    text += fmt::format("table: proved in {:.1f} % of the range, error left below {:.1g}\n",
+                        100.0 * result.table_share, result.table_bound);
+  }
+  if (result.lookup) {
+    text +=
+        fmt::format("lookup table: proved in {:.1f} % of the range\n", 100.0 * result.lookup_share);
+    for (size_t a = 0; a < result.actuators.size(); ++a) {
+      const auto at = static_cast<Eigen::Index>(a);
+      text +=
+          fmt::format("  {}: error at most {:.2g}, {:.2g} found; of its slopes at most {:.2g}\n",
+                      result.actuators[a], result.lookup->bound[at], result.lookup_error[at],
+                      result.lookup->slope_bound.row(at).maxCoeff());
+    }
+  }
+  return text + JudgementsText(result);
+}
+
+nlohmann::ordered_json ToJson(const CodeResult& result, const std::string& model) {
+  nlohmann::ordered_json json = {{"model", model},
+                                 {"name", result.name},
+                                 {"coordinates", result.coordinates},
+                                 {"actuators", result.actuators},
+                                 {"notes", result.notes},
+                                 {"blocks", result.blocks},
+                                 {"largest_block", result.largest_block},
+                                 {"searched", result.unknowns},
+                                 {"limit", CodeJudgement::kLimit},
+                                 {"agrees", result.agrees()}};
+  if (!std::isnan(result.table_bound)) {
+    json["table"] = {{"error", result.table_bound}, {"proved", result.table_share}};
+  }
+  if (result.lookup) {
+    json["lookup"] = {
+        {"proved", result.lookup_share},
+        {"bound", std::vector<double>(result.lookup->bound.begin(), result.lookup->bound.end())},
+        {"found", std::vector<double>(result.lookup_error.begin(), result.lookup_error.end())}};
+  }
+  json["judgements"] = nlohmann::ordered_json::array();
+  for (const CodeJudgement& one : result.judgements) {
+    json["judgements"].push_back({{"language", one.language},
+                                  {"compiler", one.compiler},
+                                  {"not_judged", one.not_judged},
+                                  {"agrees", one.agrees()},
+                                  {"states", one.states},
+                                  {"only_one", one.only_one},
+                                  {"position", NumberOrNull(one.position)},
+                                  {"rates", NumberOrNull(one.jacobian)},
+                                  {"force", NumberOrNull(one.force)},
+                                  {"along", NumberOrNull(one.along)},
+                                  {"output", NumberOrNull(one.output)},
+                                  {"back", NumberOrNull(one.back)},
+                                  {"nanoseconds", NumberOrNull(one.nanoseconds)},
+                                  {"slip", one.slip},
+                                  {"warnings", one.warnings}});
+  }
+  json["files"] = nlohmann::ordered_json::array();
+  for (const auto& [name, content] : result.files) json["files"].push_back(name);
+  return json;
+}
 
 bool CodeJudgement::agrees() const {
   bool any = false, within = true;
@@ -308,6 +446,7 @@ bool CodeJudgement::agrees() const {
 }
 
 bool CodeResult::agrees() const {
+  if (lookup && (lookup_error.array() > lookup->bound.array() * (1.0 + 1e-9)).any()) return false;
   return !diagnostics.has_errors() && std::ranges::all_of(judgements, [](const CodeJudgement& one) {
     return !one.not_judged.empty() || one.agrees();
   });

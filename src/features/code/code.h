@@ -3,6 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,11 +21,11 @@ struct CodeRange {
 };
 
 struct CodeSettings {
-  std::string name;               ///< before all names in C; "": of the mechanism
-  std::vector<CodeRange> ranges;  ///< of all coordinates: with a table to start from
-  size_t states = 10000;          ///< that it is judged by
+  std::string name;                    ///< before all names in C; "": of the mechanism
+  std::vector<CodeRange> ranges = {};  ///< of all coordinates: with a table to start from
+  size_t states = 10000;               ///< that it is judged by
   std::uint64_t seed = 1;
-  std::string check;  ///< another header with the same functions, to be judged instead
+  std::string check = {};  ///< another header with the same functions, to be judged instead
   bool compile = true;
   std::string origin;  ///< for the head: how the model is called
 };
@@ -57,16 +59,24 @@ struct CodeResult {
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
   std::vector<CodeJudgement> judgements;
   double table_bound = kNan, table_share = kNan;  ///< error left, share of the range that is proved
-  Diagnostics diagnostics;                        ///< errors: there is no code
+  std::optional<LookupTable> lookup = {};
+  double lookup_share = kNan;  ///< of its cells, that are proved
+  VecX lookup_error = {};      ///< per actuator: largest that was found at the states
+  Diagnostics diagnostics;     ///< errors: there is no code
 
   [[nodiscard]] bool agrees() const;
 };
 
+/// To read, the verdicts alone, and for programs.
+[[nodiscard]] std::string ToText(const CodeResult& result);
+[[nodiscard]] std::string JudgementsText(const CodeResult& result);
+[[nodiscard]] nlohmann::ordered_json ToJson(const CodeResult& result, const std::string& model);
+
 /// What code is made for.
 struct CodeTask {
-  std::vector<NamedCoordinate> coordinates;  ///< q
-  std::vector<NamedCoordinate> held;         ///< at home
-  std::vector<NamedCoordinate> actuators;    ///< drives and prescribed joints
+  std::vector<NamedCoordinate> coordinates;     ///< q
+  std::vector<NamedCoordinate> held;            ///< at home
+  std::vector<NamedCoordinate> actuators = {};  ///< drives and prescribed joints
   /// The mechanism is a part of `whole`, and the forces of another part, `given`, along the
   /// coordinates are inputs: together they need the actuators' forces of the whole.
   const Mechanism* whole = nullptr;

@@ -31,105 +31,6 @@ struct CodeArguments {
   JsonOption json;
 };
 
-std::string JudgementText(const CodeJudgement& judgement) {
-  if (!judgement.not_judged.empty()) {
-    std::string text =
-        fmt::format("{}: not judged: {}\n", judgement.language, judgement.not_judged);
-    for (const std::string& line : judgement.warnings) text += "  " + OneLine(line) + "\n";
-    return text;
-  }
-  std::string text = fmt::format("{}: {} at {} states", judgement.language,
-                                 judgement.agrees() ? "agrees" : "DIFFERS", judgement.states);
-  const char* before = ": ";
-  const auto add = [&](const char* what, double difference) {
-    if (std::isnan(difference)) return;
-    text += fmt::format("{}{} {:.2g}", before, what, difference);
-    before = ", ";
-  };
-  add("positions", judgement.position);
-  add("rates and accelerations", judgement.jacobian);
-  add("forces", judgement.force);
-  add("forces along the coordinates", judgement.along);
-  add("outputs", judgement.output);
-  text += fmt::format(" (limit {:.0e} of the largest value)", CodeJudgement::kLimit);
-  if (!std::isnan(judgement.nanoseconds)) {
-    text += fmt::format("; {:.3g} µs a state", 1e-3 * judgement.nanoseconds);
-  }
-  text += "\n";
-  if (judgement.back < 1.0) {
-    text += fmt::format(
-        "  the way back from the actuators' positions ends at the same coordinates in "
-        "{:.1f} % of the states, else in another assembly or nowhere\n",
-        100.0 * judgement.back);
-  }
-  if (judgement.only_one > 0) {
-    text += fmt::format("  {} states that only one of the two reaches\n", judgement.only_one);
-  }
-  if (!judgement.agrees()) {
-    text += judgement.slip.empty() ? "  no single slip explains it\n"
-                                   : "  what explains it: " + judgement.slip + "\n";
-  }
-  for (const std::string& line : judgement.warnings) text += "  " + OneLine(line) + "\n";
-  return text;
-}
-
-std::string CodeText(const CodeResult& result) {
-  std::string text = fmt::format("coordinates: {}\nactuators: {}\n", Joined(result.coordinates),
-                                 Joined(result.actuators));
-  text += result.blocks == 0
-              ? "the joints follow from the coordinates without equations to solve\n"
-              : fmt::format("{} joints' coordinates are searched, in {} blocks of at most {}\n",
-                            result.unknowns, result.blocks, result.largest_block);
-  for (const std::string& note : result.notes) text += note + "\n";
-  if (!std::isnan(result.table_bound)) {
-    text += fmt::format("table: proved in {:.1f} % of the range, error left below {:.1g}\n",
-                        100.0 * result.table_share, result.table_bound);
-  }
-  for (const CodeJudgement& judgement : result.judgements) text += JudgementText(judgement);
-  return text;
-}
-
-nlohmann::ordered_json NumberOrNull(double value) {
-  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
-
-nlohmann::ordered_json CodeJson(const CodeResult& result, const std::string& model) {
-  nlohmann::ordered_json json = {{"model", model},
-                                 {"name", result.name},
-                                 {"coordinates", result.coordinates},
-                                 {"actuators", result.actuators},
-                                 {"notes", result.notes},
-                                 {"blocks", result.blocks},
-                                 {"largest_block", result.largest_block},
-                                 {"searched", result.unknowns},
-                                 {"limit", CodeJudgement::kLimit},
-                                 {"agrees", result.agrees()}};
-  if (!std::isnan(result.table_bound)) {
-    json["table"] = {{"error", result.table_bound}, {"proved", result.table_share}};
-  }
-  json["judgements"] = nlohmann::ordered_json::array();
-  for (const CodeJudgement& one : result.judgements) {
-    json["judgements"].push_back({{"language", one.language},
-                                  {"compiler", one.compiler},
-                                  {"not_judged", one.not_judged},
-                                  {"agrees", one.agrees()},
-                                  {"states", one.states},
-                                  {"only_one", one.only_one},
-                                  {"position", NumberOrNull(one.position)},
-                                  {"rates", NumberOrNull(one.jacobian)},
-                                  {"force", NumberOrNull(one.force)},
-                                  {"along", NumberOrNull(one.along)},
-                                  {"output", NumberOrNull(one.output)},
-                                  {"back", NumberOrNull(one.back)},
-                                  {"nanoseconds", NumberOrNull(one.nanoseconds)},
-                                  {"slip", one.slip},
-                                  {"warnings", one.warnings}});
-  }
-  json["files"] = nlohmann::ordered_json::array();
-  for (const auto& [name, content] : result.files) json["files"].push_back(name);
-  return json;
-}
-
 int Code(CodeArguments arguments) {
   const auto file = FindModelOrRefuse(arguments.model);
   if (!file) return 2;
@@ -168,12 +69,8 @@ int Code(CodeArguments arguments) {
   SayText(stderr, result.diagnostics.Text());
   if (result.diagnostics.has_errors()) return 2;
   std::FILE* to = arguments.json.text();
-  if (!arguments.quiet) {
-    SayText(to, CodeText(result));
-  } else {
-    for (const CodeJudgement& judgement : result.judgements) SayText(to, JudgementText(judgement));
-  }
-  const std::string json = arguments.json.Text(CodeJson(result, mechanism.name));
+  SayText(to, arguments.quiet ? JudgementsText(result) : ToText(result));
+  const std::string json = arguments.json.Text(ToJson(result, mechanism.name));
   std::vector<std::pair<std::string, std::string>> files = {{"code.json", json}};
   if (settings.check.empty()) files.insert(files.begin(), result.files.begin(), result.files.end());
   OutputFolder folder(arguments.out, mechanism.name + "/code");

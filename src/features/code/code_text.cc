@@ -1159,6 +1159,88 @@ def self_test():
 std::string CHeader(const MechanismFormulas& formulas, const CodeTextOptions& options) {
   return CodeWriter(formulas, options, false).Text();
 }
+std::string LookupHeader(const MechanismFormulas& formulas, const LookupTable& table,
+                         const CodeTextOptions& options) {
+  const std::string prefix = options.name + "_lookup";
+  std::string guard = prefix;
+  std::ranges::transform(guard, guard.begin(), [](char c) {
+    return static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  });
+  std::string text = "/*\n";
+  for (const std::string& line : options.heading)
+    text += line.empty() ? " *\n" : " * " + line + "\n";
+  text +=
+      " *\n * The actuators' positions by multilinear interpolation. Proved bounds of its "
+      "errors:\n";
+  for (size_t a = 0; a < formulas.actuators.size(); ++a) {
+    const auto at = static_cast<Eigen::Index>(a);
+    text += fmt::format(" *   {}: {:.2g} {}; of its slopes {:.2g}\n",
+                        OneLine(formulas.actuators[a].name), table.bound[at],
+                        formulas.actuators[a].unit, table.slope_bound.row(at).maxCoeff());
+  }
+  text += fmt::format(" */\n#ifndef {0}_H\n#define {0}_H\n\n", guard);
+  const auto n = static_cast<int>(formulas.size()), m = static_cast<int>(formulas.actuators.size());
+  text += fmt::format(
+      "/* m[{0}] and their slopes J[{0} x {1}] by rows at q[{1}]; 0 outside of what is proved. */\n"
+      "static inline int {2}(const double q[], double m[], double J[]) {{\n",
+      m, n, prefix);
+  const VecX step =
+      (table.high - table.low).cwiseQuotient(VecX::NullaryExpr(n, [&](Eigen::Index k) {
+        return static_cast<double>(table.nodes[static_cast<size_t>(k)] - 1);
+      }));
+  std::vector<int> bytes((table.proved.size() + 7) / 8, 0);
+  for (size_t i = 0; i < table.proved.size(); ++i) {
+    if (table.proved[i]) bytes[i / 8] |= 1 << (i % 8);
+  }
+  std::vector<std::string> values;
+  for (Eigen::Index i = 0; i < table.values.rows(); ++i) {
+    for (const double value : VecX(table.values.row(i).transpose()))
+      values.push_back(NumberText(value));
+  }
+  text += "  static const double low[] = {" + Joined(Numbers(table.low)) + "};\n";
+  text += "  static const double step[] = {" + Joined(Numbers(step)) + "};\n";
+  text += "  static const int nodes[] = {" + Joined(Numbers(table.nodes)) + "};\n";
+  text += "  static const unsigned char proved[] = {\n" + List(Numbers(bytes), "    ") + "  };\n";
+  text += "  static const double table[] = {\n" + List(values, "    ") + "  };\n";
+  text += fmt::format(R"code(  double part[{0}];
+  int first[{0}];
+  int i, j, k, corner, cell = 0;
+  for (k = 0; k < {0}; ++k) {{
+    const double t = (q[k] - low[k]) / step[k];
+    if (!(t >= 0.0 && t <= nodes[k] - 1)) return 0;
+    first[k] = (int)t;
+    if (first[k] == nodes[k] - 1) --first[k];
+    part[k] = t - first[k];
+    cell = cell * (nodes[k] - 1) + first[k];
+  }}
+  if (((proved[cell >> 3] >> (cell & 7)) & 1) == 0) return 0;
+  for (i = 0; i < {1}; ++i) m[i] = 0.0;
+  for (i = 0; i < {1} * {0}; ++i) J[i] = 0.0;
+  for (corner = 0; corner < (1 << {0}); ++corner) {{
+    double weight = 1.0;
+    int node = 0;
+    for (k = 0; k < {0}; ++k) {{
+      const int upper = (corner >> k) & 1;
+      weight *= upper != 0 ? part[k] : 1.0 - part[k];
+      node = node * nodes[k] + first[k] + upper;
+    }}
+    for (i = 0; i < {1}; ++i) m[i] += weight * table[node * {1} + i];
+    for (k = 0; k < {0}; ++k) {{
+      double slope = ((corner >> k) & 1) != 0 ? 1.0 : -1.0;
+      for (j = 0; j < {0}; ++j) {{
+        if (j != k) slope *= ((corner >> j) & 1) != 0 ? part[j] : 1.0 - part[j];
+      }}
+      for (i = 0; i < {1}; ++i) J[i * {0} + k] += slope / step[k] * table[node * {1} + i];
+    }}
+  }}
+  return 1;
+}}
+
+#endif
+)code",
+                      n, m);
+  return text;
+}
 std::string PythonModule(const MechanismFormulas& formulas, const CodeTextOptions& options) {
   return CodeWriter(formulas, options, true).Text();
 }

@@ -29,6 +29,21 @@ struct StartTable {
   double bound = kNan;            ///< of the error of x that is left [rad, or L] at proved cells
 };
 
+/// The actuators' positions at nodes, multilinear between them, with bounds of the errors of this
+/// by interval arithmetic, in the cells where they are proved:
+///   |m − m_I| <= Σ_i h_i²/8 max|∂_i² m|,  |∂_i m − ∂_i m_I| <= Σ_j h_j/2 max|∂_i ∂_j m|     (1)
+struct LookupTable {
+  VecX low, high;                 ///< [rad or m]
+  std::vector<int> nodes = {};    ///< per coordinate
+  MatX values = {};               ///< nodes × actuators; the last coordinate runs fastest
+  std::vector<bool> proved = {};  ///< per cell
+  VecX bound = {};                ///< per actuator: of its position
+  MatX slope_bound = {};          ///< actuators × coordinates: of ∂m/∂q
+
+  /// m_I and its slopes at q; false outside of what is proved.
+  [[nodiscard]] bool At(const VecX& q, VecX* m, MatX* slopes) const;
+};
+
 struct CodeTextOptions {
   std::string name;                  ///< before all names in C
   std::vector<std::string> heading;  ///< comment lines
@@ -40,6 +55,9 @@ struct CodeTextOptions {
 /// A header without library (but math.h) and heap.
 [[nodiscard]] std::string CHeader(const MechanismFormulas& formulas,
                                   const CodeTextOptions& options);
+/// C99 of a lookup table: NAME_lookup(q, m, J), without library and heap.
+[[nodiscard]] std::string LookupHeader(const MechanismFormulas& formulas, const LookupTable& table,
+                                       const CodeTextOptions& options);
 /// The same functions in Python without packages.
 [[nodiscard]] std::string PythonModule(const MechanismFormulas& formulas,
                                        const CodeTextOptions& options);

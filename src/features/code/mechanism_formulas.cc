@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <utility>
 
 #include "base/demand.h"
 #include "mechanism/idle_spins.h"
@@ -119,12 +120,7 @@ class FormulaMaker {
                                           const std::vector<NamedCoordinate>& actuators) {
     AddOutputJoints(coordinates);
     AddOutputJoints(held);
-    if (!BuildSpanningTree(&m_, Hints()).ok()) {
-      // Outputs of bodies that already hang together: the tree without their joints.
-      while (static_cast<int>(m_.joints.size()) > own_joints_) m_.joints.pop_back();
-      output_joints_.clear();
-      MBV_DEMAND(BuildSpanningTree(&m_, {}).ok(), m_.name);
-    }
+    BuildTree(coordinates);
     made_->held = held;
     AddCoordinatesOfTree(held);
     FindMotion();
@@ -210,6 +206,26 @@ class FormulaMaker {
       if (from != to) std::replace(group.begin(), group.end(), from, to);
     }
     return hints;
+  }
+
+  // Chosen coordinates stay in the tree, if they can. What has no mass counts like other bodies
+  // here.
+  void BuildTree(const std::vector<NamedCoordinate>& coordinates) {
+    std::vector<double> masses;
+    for (Body& body : m_.bodies) masses.push_back(std::exchange(body.mass, 1.0));
+    ClosureHints hints = Hints();
+    for (const NamedCoordinate& at : coordinates) {
+      if (at.coordinate.kind != Coordinate::Kind::kJoint) continue;
+      std::optional<bool>& hint = hints[static_cast<size_t>(at.coordinate.index)];
+      if (!hint) hint = false;
+    }
+    if (!BuildSpanningTree(&m_, hints).ok() && !BuildSpanningTree(&m_, Hints()).ok()) {
+      // Without the joints of outputs.
+      while (static_cast<int>(m_.joints.size()) > own_joints_) m_.joints.pop_back();
+      output_joints_.clear();
+      MBV_DEMAND(BuildSpanningTree(&m_, {}).ok(), m_.name);
+    }
+    for (size_t b = 0; b < masses.size(); ++b) m_.bodies[b].mass = masses[b];
   }
 
   bool Refuse(const std::string& message, const std::string& hint) {

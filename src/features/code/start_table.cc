@@ -233,13 +233,14 @@ using IntervalMatrix = std::vector<Interval>;  // by rows
 
 // Tapes of one block.
 struct BlockTapes {
-  FormulaTape residual, columns, others, by_q, second;
+  FormulaTape residual, columns, others, by_q, second, bias;
   BlockTapes(const MechanismFormulas& f, const ClosureBlock& block)
       : residual(block.residual),
         columns(block.columns),
         others(block.others),
         by_q(ByQ(f, block)),
-        second(Second(f, block)) {}
+        second(Second(f, block)),
+        bias(block.bias) {}
   static std::vector<Expr> ByQ(const MechanismFormulas& f, const ClosureBlock& block) {
     std::vector<Expr> all;
     for (size_t k = 0; k < f.size(); ++k) {
@@ -275,6 +276,94 @@ class CellProver {
   CellProver(const MechanismFormulas& formulas, PoseFinder* finder)
       : f_(formulas), finder_(*finder) {
     for (const ClosureBlock& block : f_.closure.blocks) tapes_.emplace_back(f_, block);
+    std::vector<Expr> factors, bias;
+    for (const ActuatorFormula& actuator : f_.actuators) {
+      bias.push_back(actuator.bias);
+      for (const auto& [rate, factor] : actuator.rates) factors.push_back(factor);
+    }
+    factors_.emplace(factors);
+    actuator_bias_.emplace(bias);
+  }
+
+  // ∂_i ∂_j of the actuators' positions over the cell that was proved last, actuator by actuator.
+  // Along w = ∂x/∂q_i or the sum of two of them, J s = −γ(x, w) gives the second derivative s.
+  std::optional<std::vector<Interval>> Seconds() {
+    const Interval::Guard rounding;
+    const size_t n = f_.size(), positions = f_.x.size();
+    std::vector<Solver> solvers(tapes_.size());
+    std::vector<std::vector<Interval>> others;
+    std::vector<Interval> slopes(positions * n, Interval(0.0));
+    for (size_t k = 0; k < n; ++k) {
+      if (f_.closure.direct[k] >= 0) slopes[PlaceOf(f_.closure.direct[k]) * n + k] = Interval(1.0);
+    }
+    const auto solve = [&](size_t b, const std::vector<Interval>& known_part, auto&& known_at,
+                           auto&& store) {
+      const ClosureBlock& block = f_.closure.blocks[b];
+      const size_t m = block.rates.size(), known = block.known.size();
+      std::vector<Interval> v(m);
+      for (size_t i = 0; i < m; ++i) {
+        v[i] = -known_part[i];
+        for (size_t j = 0; j < known; ++j) {
+          v[i] = v[i] - others[b][i * known + j] * known_at(PlaceOf(block.known[j]));
+        }
+      }
+      const std::vector<Interval> y = solvers[b].Times(v);
+      for (size_t i = 0; i < m; ++i) {
+        store(PlaceOf(block.rates[i]), y[i] * Interval(ScaleOf(block.rates[i])));
+      }
+    };
+    for (size_t b = 0; b < tapes_.size(); ++b) {
+      const size_t m = f_.closure.blocks[b].rates.size();
+      if (!solvers[b].Set(ScaledColumns(b), static_cast<Eigen::Index>(m))) return std::nullopt;
+      others.push_back(Evaluate(tapes_[b].others));
+      const std::vector<Interval> by_q = Evaluate(tapes_[b].by_q);
+      for (size_t k = 0; k < n; ++k) {
+        solve(
+            b,
+            {by_q.begin() + static_cast<std::ptrdiff_t>(k * m),
+             by_q.begin() + static_cast<std::ptrdiff_t>((k + 1) * m)},
+            [&](size_t x) { return slopes[x * n + k]; },
+            [&](size_t x, const Interval& value) { slopes[x * n + k] = value; });
+      }
+    }
+    const std::vector<Interval> factors = Evaluate(*factors_);
+    const size_t actuators = f_.actuators.size();
+    std::vector<Interval> all(actuators * n * n, Interval(0.0));
+    const auto along = [&](size_t i, size_t j) {
+      for (size_t k = 0; k < f_.rates.size(); ++k) {
+        const size_t x = PlaceOf(static_cast<int>(k));
+        const Interval w = i == j ? slopes[x * n + i] : slopes[x * n + i] + slopes[x * n + j];
+        inputs_[f_.graph.InputOf(f_.u[k])] = w;
+      }
+      std::vector<Interval> second(positions, Interval(0.0));
+      for (size_t b = 0; b < tapes_.size(); ++b) {
+        solve(
+            b, Evaluate(tapes_[b].bias), [&](size_t x) { return second[x]; },
+            [&](size_t x, const Interval& value) { second[x] = value; });
+      }
+      std::vector<Interval> sums = Evaluate(*actuator_bias_);
+      size_t at = 0;
+      for (size_t a = 0; a < actuators; ++a) {
+        for (const auto& [rate, factor] : f_.actuators[a].rates) {
+          sums[a] = sums[a] + factors[at++] * second[PlaceOf(rate)];
+        }
+      }
+      return sums;
+    };
+    for (size_t i = 0; i < n; ++i) {
+      const std::vector<Interval> sums = along(i, i);
+      for (size_t a = 0; a < actuators; ++a) all[(a * n + i) * n + i] = sums[a];
+    }
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t j = 0; j < i; ++j) {
+        const std::vector<Interval> sums = along(i, j);
+        for (size_t a = 0; a < actuators; ++a) {
+          all[(a * n + i) * n + j] = all[(a * n + j) * n + i] =
+              Interval(0.5) * (sums[a] - all[(a * n + i) * n + i] - all[(a * n + j) * n + j]);
+        }
+      }
+    }
+    return all;
   }
 
   // `start`: x by the table at the centre; `slope_low`, `slope_high`: of the table over the cell.
@@ -327,6 +416,39 @@ class CellProver {
     tape.Evaluate(inputs_, &work_, &values);
     return values;
   }
+
+  // J⁻¹ v over a cell: A v widened by what 1 − A J leaves.
+  struct Solver {
+    MatX A;
+    double widen = 0.0;
+    bool Set(const IntervalMatrix& J, Eigen::Index m) {
+      MatX middle(m, m);
+      for (Eigen::Index i = 0; i < m * m; ++i) {
+        const Interval& at = J[static_cast<size_t>(i)];
+        middle(i / m, i % m) = 0.5 * (at.low() + at.high());
+      }
+      const Eigen::FullPivLU<MatX> lu(middle);
+      if (!lu.isInvertible()) return false;
+      A = lu.inverse();
+      IntervalMatrix E;
+      const double contraction = Contraction(A, J, &E);
+      widen = contraction / (1.0 - contraction);
+      return contraction < 0.9;
+    }
+    [[nodiscard]] std::vector<Interval> Times(const std::vector<Interval>& v) const {
+      std::vector<Interval> y(v.size(), Interval(0.0));
+      double most = 0.0;
+      for (size_t i = 0; i < v.size(); ++i) {
+        for (size_t j = 0; j < v.size(); ++j) {
+          y[i] =
+              y[i] + Interval(A(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))) * v[j];
+        }
+        most = std::max(most, y[i].magnitude());
+      }
+      for (Interval& part : y) part = part + Interval(-widen * most, widen * most);
+      return y;
+    }
+  };
 
   // |1 − A J|, rows' sums; J scaled.
   static double Contraction(const MatX& A, const IntervalMatrix& J, IntervalMatrix* E) {
@@ -537,6 +659,7 @@ class CellProver {
   const MechanismFormulas& f_;
   PoseFinder& finder_;
   std::vector<BlockTapes> tapes_;
+  std::optional<FormulaTape> factors_, actuator_bias_;
   std::vector<Interval> inputs_, work_;
 };
 
@@ -574,6 +697,59 @@ class TableMaker {
     }
     Connect();
     return std::move(table_);
+  }
+
+  // Its nodes are the corners of the cells of `start`.
+  LookupTable Lookup(const StartTable& start) {
+    table_ = start;
+    const size_t n = f_.size();
+    const auto N = static_cast<Eigen::Index>(n), M = static_cast<Eigen::Index>(f_.actuators.size());
+    LookupTable lookup{.low = low_, .high = high_};
+    for (const int cells : start.cells) lookup.nodes.push_back(cells + 1);
+    const Grid nodes(lookup.nodes, low_, high_);
+    const std::vector<std::optional<VecX>> poses = PosesAt(f_, &finder_, nodes);
+    std::vector<Expr> values;
+    for (const ActuatorFormula& actuator : f_.actuators) values.push_back(actuator.value);
+    const FormulaTape tape(values);
+    std::vector<double> inputs(f_.graph.inputs(), 0.0), work, found;
+    lookup.values = MatX::Zero(nodes.size(), M);
+    for (int i = 0; i < nodes.size(); ++i) {
+      if (!poses[static_cast<size_t>(i)]) continue;
+      for (size_t k = 0; k < f_.x.size(); ++k) {
+        inputs[f_.graph.InputOf(f_.x[k])] =
+            (*poses[static_cast<size_t>(i)])[static_cast<Eigen::Index>(k)];
+      }
+      tape.Evaluate(inputs, &work, &found);
+      lookup.values.row(i) = Eigen::Map<VecX>(found.data(), M).transpose();
+    }
+    const Grid cells = CellGrid();
+    lookup.proved.assign(start.proved.size(), false);
+    lookup.bound = VecX::Zero(M);
+    lookup.slope_bound = MatX::Zero(M, N);
+    for (int c = 0; c < cells.size(); ++c) {
+      if (!start.proved[static_cast<size_t>(c)]) continue;
+      bool corners = true;  // the branch of home reaches them
+      for (int corner = 0; corner < (1 << n); ++corner) {
+        std::vector<int> at = cells.At(c);
+        for (size_t k = 0; k < n; ++k) at[k] += (corner >> k) & 1;
+        corners = corners && poses[static_cast<size_t>(nodes.Index(at))];
+      }
+      MatX seconds = MatX::Zero(M * N, N);  // magnitudes
+      const VecX low = cells.Point(cells.At(c));
+      if (!corners || !BoundSeconds(low, low + cells.step, 0, &seconds)) continue;
+      lookup.proved[static_cast<size_t>(c)] = true;
+      for (Eigen::Index a = 0; a < M; ++a) {
+        double error = 0.0;
+        for (Eigen::Index i = 0; i < N; ++i) {
+          const double h = nodes.step[i];
+          error += h * h / 8.0 * seconds(a * N + i, i);
+          const double slope = 0.5 * seconds.row(a * N + i).dot(nodes.step);
+          lookup.slope_bound(a, i) = std::max(lookup.slope_bound(a, i), slope);
+        }
+        lookup.bound[a] = std::max(lookup.bound[a], error);
+      }
+    }
+    return lookup;
   }
 
  private:
@@ -695,6 +871,29 @@ class TableMaker {
       VecX from = low;
       for (Eigen::Index k = 0; k < from.size(); ++k) from[k] += ((part >> k) & 1) * half[k];
       if (!DivideCell(cell, from, from + half, splits + 1)) return false;
+    }
+    return true;
+  }
+
+  // Largest magnitudes over a cell, by parts of it where that is needed.
+  bool BoundSeconds(const VecX& low, const VecX& high, int splits, MatX* largest) {
+    if (Prove(low, high)) {
+      const auto found = prover_.Seconds();
+      if (found) {
+        const Eigen::Index n = largest->cols();
+        for (Eigen::Index i = 0; i < largest->size(); ++i) {
+          double& at = (*largest)(i / n, i % n);
+          at = std::max(at, (*found)[static_cast<size_t>(i)].magnitude());
+        }
+        return true;
+      }
+    }
+    if (splits == kSplits) return false;
+    const VecX half = 0.5 * (high - low);
+    for (int part = 0; part < (1 << low.size()); ++part) {
+      VecX from = low;
+      for (Eigen::Index k = 0; k < from.size(); ++k) from[k] += ((part >> k) & 1) * half[k];
+      if (!BoundSeconds(from, from + half, splits + 1, largest)) return false;
     }
     return true;
   }
@@ -834,6 +1033,46 @@ StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low, co
     if (!better && count(best) > 0.0) break;
   }
   return best;
+}
+
+LookupTable MakeLookupTable(const MechanismFormulas& formulas, const StartTable& start) {
+  return TableMaker(formulas, start.low, start.high, {}).Lookup(start);
+}
+
+bool LookupTable::At(const VecX& q, VecX* m, MatX* slopes) const {
+  const Grid grid(nodes, low, high);
+  const Eigen::Index n = q.size();
+  std::vector<int> first(nodes.size());
+  VecX part(n);
+  int cell = 0;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto at = static_cast<size_t>(k);
+    const double t = (q[k] - low[k]) / grid.step[k];
+    if (!(t >= 0.0 && t <= nodes[at] - 1)) return false;
+    first[at] = std::min(static_cast<int>(t), nodes[at] - 2);
+    part[k] = t - first[at];
+    cell = cell * (nodes[at] - 1) + first[at];
+  }
+  if (!proved[static_cast<size_t>(cell)]) return false;
+  m->setZero(values.cols());
+  slopes->setZero(values.cols(), n);
+  for (int corner = 0; corner < (1 << n); ++corner) {
+    std::vector<int> at = first;
+    VecX weight(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const int upper = (corner >> k) & 1;
+      at[static_cast<size_t>(k)] += upper;
+      weight[k] = upper != 0 ? part[k] : 1.0 - part[k];
+    }
+    const VecX node = values.row(grid.Index(at)).transpose();
+    *m += weight.prod() * node;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      double slope = ((corner >> k) & 1) != 0 ? 1.0 : -1.0;
+      for (Eigen::Index j = 0; j < n; ++j) slope *= j == k ? 1.0 : weight[j];
+      slopes->col(k) += slope / grid.step[k] * node;
+    }
+  }
+  return true;
 }
 
 }  // namespace mbv

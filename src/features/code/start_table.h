@@ -23,4 +23,8 @@ namespace mbv {
                                         const VecX& high, std::string* why,
                                         const std::function<void(double)>& progress);
 
+/// Over the cells that `start` proves.
+[[nodiscard]] LookupTable MakeLookupTable(const MechanismFormulas& formulas,
+                                          const StartTable& start);
+
 }  // namespace mbv

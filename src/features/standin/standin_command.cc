@@ -11,6 +11,7 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
+#include "features/standin/standin_export.h"
 #include "features/standin/standin_report.h"
 #include "model_file/load_model.h"
 #include "model_file/yaml/units.h"
@@ -25,7 +26,7 @@ struct StandinArguments {
   std::vector<std::string> joints, ranges, set;
   RobotArguments options;
   StandinSettings settings;
-  bool quiet = false;
+  bool quiet = false, exports = false;
   JsonOption json;
 };
 
@@ -100,17 +101,30 @@ int Standin(const StandinArguments& arguments) {
   } else {
     SayText(to, ToText(result, {.color = WantsColor(to), .columns = TerminalColumns(to)}));
   }
-  const std::string json = arguments.json.Text(ToJson(result, mechanism.name));
+  nlohmann::ordered_json document = ToJson(result, mechanism.name);
+  std::vector<std::pair<std::string, std::string>> files = {
+      {"standin.html", StandinPage(result, mechanism.name)}, {"standin.csv", StandinCsv(result)}};
+  bool agrees = true;
+  if (arguments.exports) {
+    const StandinExport made =
+        ExportStandin(mechanism, result, mechanism.name + "_standin", progress);
+    line.Clear();
+    SayText(stderr, made.code.diagnostics.Text());
+    if (made.code.diagnostics.has_errors()) return 2;
+    SayText(to, ToText(made));
+    document["exports"] = ToJson(made, mechanism.name);
+    files.insert(files.end(), made.files.begin(), made.files.end());
+    agrees = made.agrees();
+  }
+  const std::string json = arguments.json.Text(document);
+  files.emplace_back("standin.json", json);
   OutputFolder folder(arguments.out, mechanism.name + "/standin");
-  if (const std::string trouble =
-          folder.WriteAll({{"standin.html", StandinPage(result, mechanism.name)},
-                           {"standin.csv", StandinCsv(result)},
-                           {"standin.json", json}});
-      !trouble.empty()) {
+  if (const std::string trouble = folder.WriteAll(files); !trouble.empty()) {
     return NotWritten(trouble, "choose another folder with --out");
   }
   if (!arguments.quiet) Say(stderr, "results in {}\n", folder.target().string());
-  return arguments.json.Write(json, inputs.files());
+  const int written = arguments.json.Write(json, inputs.files());
+  return written != 0 || agrees ? written : 1;
 }
 
 }  // namespace
@@ -149,6 +163,9 @@ void AddStandinCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   standin->add_option("--set", arguments->set, "PARAMETER=VALUE of the model (repeatable)")
       ->allow_extra_args(false);
+  standin->add_flag("--export", arguments->exports,
+                    "also writes what replaces the loop: C99, Python, a lookup table, the serial "
+                    "robot as MJCF and URDF, each judged");
   AddRobotOptions(standin, &arguments->options);
   standin->add_option("--out", arguments->out, "folder for results")->capture_default_str();
   standin->add_flag("-q,--quiet", arguments->quiet, "the sentences alone");
@@ -156,7 +173,8 @@ void AddStandinCommand(CLI::App* app, int* exit_code) {
   SetFooter(standin,
             {"standin my_robot.urdf --joints ankle_pitch,ankle_roll",
              "standin my_robot.xml --joints knee --range knee_deg=0:110 --frequency 2"},
-            "0 computed, 2 bad input, 3 results could not be written, 4 internal error");
+            "0 computed, 1 an export differs from the full loop, 2 bad input, 3 results could not "
+            "be written, 4 internal error");
   standin->callback([arguments, exit_code] { *exit_code = Standin(*arguments); });
 }
 
