@@ -65,7 +65,8 @@ std::optional<std::vector<Coordinate>> SameCoordinates(const Mechanism& mechanis
 }
 
 // Of the file's content against `serial` with armature.
-SerialFile JudgeSerial(const std::string& name, const std::string& text, const Mechanism& serial,
+SerialFile JudgeSerial(const std::string& name, const std::string& text,
+                       const std::string& companion, const Mechanism& serial,
                        const Transmission& transmission, const StandinResult& result) {
   SerialFile file{.name = name};
   const ScratchFolder folder("standin");
@@ -73,6 +74,9 @@ SerialFile JudgeSerial(const std::string& name, const std::string& text, const M
   if (!file.not_judged.empty()) return file;
   const std::filesystem::path path = folder.path() / name;
   file.not_judged = WriteFile(path, text);
+  if (file.not_judged.empty() && !companion.empty()) {
+    file.not_judged = WriteFile(UrdfCompanionPath(path.string()), companion);
+  }
   if (!file.not_judged.empty()) return file;
   const LoadResult loaded = LoadRobot(path.string(), {});
   if (!loaded.mechanism) {
@@ -81,8 +85,13 @@ SerialFile JudgeSerial(const std::string& name, const std::string& text, const M
     }
     return file;
   }
-  std::vector<NamedCoordinate> names = transmission.joints;
-  const auto n = static_cast<Eigen::Index>(names.size());
+  // By the chosen joints' drives: formats may cut a joint in parts.
+  const size_t joints = transmission.joints.size();
+  const auto n = static_cast<Eigen::Index>(joints);
+  std::vector<NamedCoordinate> names;
+  for (size_t d = serial.drives.size() - joints; d < serial.drives.size(); ++d) {
+    names.push_back({serial.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
+  }
   // What is held in the loop may not exist in the serial robot.
   std::vector<Coordinate> own, theirs;
   std::string missing;
@@ -299,16 +308,18 @@ StandinExport ExportStandin(const Mechanism& mechanism, const StandinResult& res
   const Mechanism serial = SerialRobot(*transmission, result.armature);
   const MjcfText mjcf = MjcfFor(serial, ModelDrives::kFree);
   const auto add = [&](const std::string& file, const std::string& text,
-                       const std::string& trouble) {
+                       const std::string& companion, const std::string& trouble) {
     if (!trouble.empty()) {
       made.serial.push_back({.name = file, .not_judged = trouble});
       return;
     }
     made.files.emplace_back(file, text);
-    made.serial.push_back(JudgeSerial(file, text, serial, *transmission, result));
+    if (!companion.empty()) made.files.emplace_back(UrdfCompanionPath(file), companion);
+    made.serial.push_back(JudgeSerial(file, text, companion, serial, *transmission, result));
   };
-  add(name + "_serial.xml", mjcf.text, mjcf.trouble);
-  add(name + "_serial.urdf", WriteUrdf(serial), "");
+  add(name + "_serial.xml", mjcf.text, "", mjcf.trouble);
+  const std::string urdf = name + "_serial.urdf";
+  add(urdf, WriteUrdf(serial), WriteUrdfCompanion(serial, urdf), "");
   return made;
 }
 
