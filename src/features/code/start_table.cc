@@ -677,12 +677,12 @@ class TableMaker {
         prover_(formulas, &finder_),
         progress_(progress) {}
 
-  // With `nodes` per coordinate, and cells that they divide.
-  StartTable Make(int nodes, int cells) {
+  // With `nodes` per coordinate, cells that they divide, and steps of Newton's method.
+  StartTable Make(int nodes, int cells, int steps) {
     table_ = StartTable{.low = low_, .high = high_};
     table_.nodes.assign(f_.size(), nodes);
     table_.cells.assign(f_.size(), cells);
-    table_.steps = kSteps;
+    table_.steps = steps;
     FillNodes();
     leaves_.clear();
     failed_.assign(static_cast<size_t>(CellGrid().size()), false);
@@ -753,7 +753,6 @@ class TableMaker {
   }
 
  private:
-  static constexpr int kSteps = 3;   // of Newton's method
   static constexpr int kSplits = 3;  // of a cell, where that is needed
 
   struct Leaf {
@@ -839,7 +838,7 @@ class TableMaker {
     }
     VecX start = Interpolate(middle, middle, &slopes);
     finder_.Place(middle, &start);
-    return prover_.Prove(low, high, start, slope_low, slope_high, kSteps);
+    return prover_.Prove(low, high, start, slope_low, slope_high, table_.steps);
   }
 
   // A block of cells at once, else its parts.
@@ -1019,19 +1018,23 @@ StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low, co
     }
   }
   if (!why->empty()) return best;
-  // A finer table is worth it where it proves clearly more.
-  constexpr std::array<int, 3> kMostNodes = {33, 17, 9}, kCells = {512, 64, 16};
+  // A finer table, then more steps are worth it where they prove clearly more.
+  constexpr std::array<int, 3> kMostNodes = {65, 33, 9}, kCells = {512, 64, 16};
+  constexpr int kLeastNodes = 5, kLeastSteps = 3, kMostSteps = 5;
   constexpr double kWorth = 1.02;
   TableMaker maker(formulas, low, high, progress);
-  const auto count = [](const StartTable& table) {
-    return static_cast<double>(std::ranges::count(table.proved, true));
+  const auto better = [&](int nodes, int steps) {
+    StartTable table = maker.Make(nodes, kCells[n - 1], steps);
+    const auto count = [](const StartTable& of) {
+      return static_cast<double>(std::ranges::count(of.proved, true));
+    };
+    if (!best.proved.empty() && count(table) <= kWorth * count(best)) return count(best) == 0.0;
+    best = std::move(table);
+    return true;
   };
-  for (int nodes = 5; nodes <= kMostNodes[n - 1]; nodes = 2 * nodes - 1) {
-    StartTable table = maker.Make(nodes, kCells[n - 1]);
-    const bool better = count(table) > kWorth * count(best);
-    if (better || best.proved.empty()) best = std::move(table);
-    if (!better && count(best) > 0.0) break;
-  }
+  int nodes = kLeastNodes;
+  while (better(nodes, kLeastSteps) && 2 * nodes - 1 <= kMostNodes[n - 1]) nodes = 2 * nodes - 1;
+  for (int steps = kLeastSteps + 1; steps <= kMostSteps && better(best.nodes[0], steps);) ++steps;
   return best;
 }
 
