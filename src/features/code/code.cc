@@ -25,6 +25,7 @@ constexpr size_t kPythonStates = 300;
 constexpr int kHalvings = 6;  // of the states' spread
 constexpr double kLeastReached = 0.7;
 constexpr size_t kNamed = 12;
+constexpr size_t kWarnings = 6;  // lines of the compiler
 
 std::string CName(const std::string& text) {
   std::string name;
@@ -320,7 +321,9 @@ std::string JudgementText(const CodeJudgement& judgement) {
   if (!judgement.not_judged.empty()) {
     std::string text =
         fmt::format("{}: not judged: {}\n", judgement.language, judgement.not_judged);
-    for (const std::string& line : judgement.warnings) text += "  " + OneLine(line) + "\n";
+    for (size_t i = 0; i < std::min<size_t>(kWarnings, judgement.warnings.size()); ++i) {
+      text += "  " + OneLine(judgement.warnings[i]) + "\n";
+    }
     return text;
   }
   std::string text = fmt::format("{}: {} at {} states", judgement.language,
@@ -354,7 +357,9 @@ std::string JudgementText(const CodeJudgement& judgement) {
     text += judgement.slip.empty() ? "  no single slip explains it\n"
                                    : "  what explains it: " + judgement.slip + "\n";
   }
-  for (const std::string& line : judgement.warnings) text += "  " + OneLine(line) + "\n";
+  for (size_t i = 0; i < std::min<size_t>(kWarnings, judgement.warnings.size()); ++i) {
+    text += "  " + OneLine(judgement.warnings[i]) + "\n";
+  }
   return text;
 }
 
@@ -448,7 +453,7 @@ bool CodeJudgement::agrees() const {
 bool CodeResult::agrees() const {
   if (lookup && (lookup_error.array() > lookup->bound.array() * (1.0 + 1e-9)).any()) return false;
   return !diagnostics.has_errors() && std::ranges::all_of(judgements, [](const CodeJudgement& one) {
-    return !one.not_judged.empty() || one.agrees();
+    return (!one.not_judged.empty() && !one.broken) || one.agrees();
   });
 }
 

@@ -35,6 +35,7 @@ struct CodeJudgement {
   std::string language;         ///< "C", "C, from the table", "Python"
   std::string compiler = {};    ///< its first line about itself
   std::string not_judged = {};  ///< why; "": it was
+  bool broken = false;          ///< it does not compile or run
   size_t states = 0;            ///< that both reached
   size_t only_one = 0;          ///< that one of them reached
   double position = kNan;       ///< largest difference, by the largest value of its actuator

@@ -329,12 +329,14 @@ CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
   judgement.warnings = lines();
   if (end.exit_code != 0) {
     judgement.not_judged = "it does not compile";
+    judgement.broken = true;
     return judgement;
   }
   std::vector<std::string> argv = {(at / "test").string(), "states", "values"};
   if (from_table) argv.emplace_back("table");
   judgement.not_judged = Run(argv, at, states_.size(), &judgement);
-  if (judgement.not_judged.empty()) Compare(&judgement);
+  judgement.broken = !judgement.not_judged.empty();
+  if (!judgement.broken) Compare(&judgement);
   if (from_table) {
     // What lies outside of the proved cells is said by their share, not by states.
     judgement.only_one = 0;
@@ -392,7 +394,8 @@ print((time.perf_counter() - began) / max(1, count))
   }
   judgement.not_judged =
       Run({*python, "run.py"}, folder.path(), std::min(most, states_.size()), &judgement);
-  if (judgement.not_judged.empty()) Compare(&judgement);
+  judgement.broken = !judgement.not_judged.empty();
+  if (!judgement.broken) Compare(&judgement);
   return judgement;
 }
 

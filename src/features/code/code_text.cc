@@ -183,18 +183,20 @@ class CodeWriter {
       : f_(formulas), o_(options), python_(python), prefix_(python ? "" : options.name + "_") {}
 
   std::string Text() {
+    FindWaves();
     python_ ? PythonHead() : CHead();
     text_ += python_ ? kPythonAlgebra : Named(kCAlgebra, prefix_);
     Closure(f_.closure, "");
     if (f_.from_actuators) Closure(*f_.from_actuators, "d");
-    Function("gaps", {{"x", &f_.x}, {"q", &f_.closure.q}}, {{"r", f_.closure.gaps}});
-    if (f_.from_actuators) Function("coordinates", {{"x", &f_.x}}, {{"q", f_.closure.values}});
+    Function("waves", {{"x", &f_.x}}, {{"t", waves_}});
+    PoseFunction("gaps", {{"q", &f_.closure.q}}, {{"r", f_.closure.gaps}});
+    if (f_.from_actuators) PoseFunction("coordinates", {}, {{"q", f_.closure.values}});
     ActuatorFunctions();
     if (!f_.forces.empty()) {
-      Function("tree_forces", {{"x", &f_.x}, {"u", &f_.u}, {"du", &f_.du}}, {{"f", f_.forces}});
+      PoseFunction("tree_forces", {{"u", &f_.u}, {"du", &f_.du}}, {{"f", f_.forces}});
     }
     for (size_t o = 0; o < f_.outputs.size(); ++o) {
-      Function(fmt::format("output_{}", o), {{"x", &f_.x}}, {{"pose", f_.outputs[o].pose}});
+      PoseFunction(fmt::format("output_{}", o), {}, {{"pose", f_.outputs[o].pose}});
     }
     python_ ? PythonBody() : CBody();
     return std::move(text_);
@@ -210,12 +212,36 @@ class CodeWriter {
   }
   void Fixed(const char* text) { text_ += Named(text, prefix_); }
 
-  // Straight-line code.
+  // Sines and cosines that functions of a pose share.
+  void FindWaves() {
+    std::vector<Expr> all = f_.closure.gaps;
+    for (const ClosureBlock& block : f_.closure.blocks) {
+      Append(block.others, &all);
+      Append(block.bias, &all);
+    }
+    for (const ActuatorFormula& actuator : f_.actuators) {
+      all.push_back(actuator.value);
+      all.push_back(actuator.bias);
+      for (const auto& [rate, factor] : actuator.rates) all.push_back(factor);
+    }
+    Append(f_.forces, &all);
+    for (const OutputFormula& output : f_.outputs) Append(output.pose, &all);
+    waves_ = f_.graph.WavesOf(all);
+  }
+  // Of x and its waves t.
+  void PoseFunction(const std::string& name, std::vector<Argument> arguments,
+                    const std::vector<Result>& results) {
+    arguments.insert(arguments.begin(), {{"x", &f_.x}, {"t", &waves_}});
+    Function(name, arguments, results, waves_, "t");
+  }
+  // Straight-line code; `given` parts have values in an argument.
   void Function(const std::string& name, const std::vector<Argument>& arguments,
-                const std::vector<Result>& results) {
+                const std::vector<Result>& results, const std::vector<Expr>& given = {},
+                const std::string& given_name = "") {
     std::vector<Expr> all;
     for (const Result& result : results) Append(result.values, &all);
-    const FormulaText formulas(all, (python_ ? "_" : prefix_) + std::string("sign"));
+    const std::string sign = (python_ ? "_" : prefix_) + std::string("sign");
+    const FormulaText formulas(all, sign, given, given_name);
     std::vector<std::string> parameters;
     for (const Argument& argument : arguments) {
       parameters.push_back(python_ ? argument.name : "const double " + argument.name + "[]");
@@ -268,15 +294,28 @@ class CodeWriter {
     const char* array = tag.empty() ? "q" : "d";
     for (size_t b = 0; b < closure.blocks.size(); ++b) {
       const ClosureBlock& block = closure.blocks[b];
-      Function(fmt::format("rows{}_{}", tag, b), {{"x", &f_.x}, {array, &closure.q}},
-               {{"r", block.residual}, {"J", block.columns}});
-      if (tag.empty()) {
-        Function(fmt::format("others_{}", b), {{"x", &f_.x}, {"q", &closure.q}},
-                 {{"c", block.others}});
-        Function(fmt::format("bias_{}", b), {{"x", &f_.x}, {"u", &f_.u}, {"q", &closure.q}},
-                 {{"r", block.bias}});
+      // What stays while the block is searched comes first.
+      std::vector<Expr> all = block.residual, moving;
+      Append(block.columns, &all);
+      for (const int k : block.rates) {
+        const TreeRate& rate = f_.rates[static_cast<size_t>(k)];
+        const int parts = rate.ball < 0 ? 1 : 4;
+        for (int part = 0; part < parts; ++part) {
+          moving.push_back(f_.x[static_cast<size_t>(rate.x + part)]);
+        }
       }
-      StepFunction(block, tag, b, array);
+      const std::vector<Expr> fixed = f_.graph.FixedParts(all, moving);
+      most_fixed_ = std::max(most_fixed_, fixed.size());
+      Function(fmt::format("fixed{}_{}", tag, b), {{"x", &f_.x}, {array, &closure.q}},
+               {{"k", fixed}});
+      Function(fmt::format("rows{}_{}", tag, b), {{"x", &f_.x}, {"k", &fixed}},
+               {{"r", block.residual}, {"J", block.columns}}, fixed, "k");
+      if (tag.empty()) {
+        PoseFunction(fmt::format("others_{}", b), {{"q", &closure.q}}, {{"c", block.others}});
+        PoseFunction(fmt::format("bias_{}", b), {{"u", &f_.u}, {"q", &closure.q}},
+                     {{"r", block.bias}});
+      }
+      StepFunction(block, tag, b);
     }
     if (tag.empty()) {
       text_ += python_ ? "\n\n" : "\n";
@@ -288,21 +327,20 @@ class CodeWriter {
     ReachFunction(closure, tag, array);
   }
 
-  void StepFunction(const ClosureBlock& block, const std::string& tag, size_t b,
-                    const char* array) {
+  void StepFunction(const ClosureBlock& block, const std::string& tag, size_t b) {
     const size_t m = block.rates.size();
     if (python_) {
-      Line("\n\ndef _step{}_{}(x, {}):", tag, b, array);
+      Line("\n\ndef _step{}_{}(x, k):", tag, b);
       Line("    \"\"\"One step of Newton's method: its size, or None where it is singular.\"\"\"");
-      Line("    r, J = _rows{}_{}(x, {})", tag, b, array);
+      Line("    r, J = _rows{}_{}(x, k)", tag, b);
       Line("    pivot = _factor(J, {})", m);
       Line("    if pivot is None:\n        return None");
       Line("    _solve(J, pivot, {}, r)", m);
     } else {
-      Line("\nstatic inline int {}step{}_{}(double x[], const double {}[], double* size) {{",
-           prefix_, tag, b, array);
+      Line("\nstatic inline int {}step{}_{}(double x[], const double k[], double* size) {{",
+           prefix_, tag, b);
       Line("  double r[{}], J[{}];\n  int pivot[{}];", m, m * m, m);
-      Line("  {}rows{}_{}(x, {}, r, J);", prefix_, tag, b, array);
+      Line("  {}rows{}_{}(x, k, r, J);", prefix_, tag, b);
       Line("  if (!{}factor(J, {}, pivot)) return 0;", prefix_, m);
       Line("  {}solve(J, pivot, {}, r);", prefix_, m);
     }
@@ -351,7 +389,9 @@ class CodeWriter {
     } else {
       Line("\n/* Newton's method from x. */");
       Line("static inline int {}reach{}(double x[], const double {}[]) {{", prefix_, tag, array);
-      if (!closure.blocks.empty()) Line("  double size = 1.0;\n  int i;");
+      if (!closure.blocks.empty()) {
+        Line("  double size = 1.0, k[{}];\n  int i;", std::max<size_t>(1, most_fixed_));
+      }
     }
     const char* in = python_ ? "    " : "  ";
     const char* end = python_ ? "" : ";";
@@ -364,16 +404,16 @@ class CodeWriter {
     }
     for (size_t b = 0; b < closure.blocks.size(); ++b) {
       if (python_) {
+        Line("    k = _fixed{}_{}(x, {})", tag, b, array);
         Line("    for _ in range(STEPS):");
-        Line("        size = _step{}_{}(x, {})", tag, b, array);
+        Line("        size = _step{}_{}(x, k)", tag, b);
         Line("        if size is None:\n            return SINGULAR");
         Line("        if size < 1e-9 or not size < 0.7:\n            break");
         Line("    if not size < 1e-9:\n        return UNREACHABLE");
       } else {
-        Line("  size = 1.0;");
+        Line("  size = 1.0;\n  {}fixed{}_{}(x, {}, k);", prefix_, tag, b, array);
         Line("  for (i = 0; i < {}STEPS && size >= 1e-9; ++i) {{", prefix_);
-        Line("    if (!{}step{}_{}(x, {}, &size)) return {}SINGULAR;", prefix_, tag, b, array,
-             prefix_);
+        Line("    if (!{}step{}_{}(x, k, &size)) return {}SINGULAR;", prefix_, tag, b, prefix_);
         Line("    if (!(size < 0.7)) return {}UNREACHABLE;", prefix_);
         Line("  }}\n  if (!(size < 1e-9)) return {}UNREACHABLE;", prefix_);
       }
@@ -393,9 +433,9 @@ class CodeWriter {
       bias.push_back(actuator.bias);
       for (const auto& [rate, factor] : actuator.rates) factors.push_back(factor);
     }
-    Function("actuator_positions", {{"x", &f_.x}}, {{"d", values}});
-    Function("actuator_rates", {{"x", &f_.x}}, {{"c", factors}});
-    Function("actuator_bias", {{"x", &f_.x}, {"u", &f_.u}}, {{"b", bias}});
+    PoseFunction("actuator_positions", {}, {{"d", values}});
+    PoseFunction("actuator_rates", {}, {{"c", factors}});
+    PoseFunction("actuator_bias", {{"u", &f_.u}}, {{"b", bias}});
   }
 
   // "c[0]*G[3*n + k] + …" of an actuator.
@@ -466,6 +506,8 @@ class CodeWriter {
     Line("typedef struct {{");
     Line("  double q[{}N];          /* coordinates */", prefix_);
     Line("  double x[{}];            /* of the joints' tree */", std::max<size_t>(1, f_.x.size()));
+    Line("  double t[{}];            /* sines and cosines of these */",
+         std::max<size_t>(1, waves_.size()));
     Line("  double G[{}];            /* its rates per rate of q, by rows */",
          std::max<size_t>(1, f_.rates.size() * n()));
     Line("  double lu[{}], c[{}];", std::max<size_t>(1, factors), std::max<size_t>(1, others));
@@ -486,7 +528,8 @@ class CodeWriter {
     Line("\n/* The rates of a pose's x; lu, c and pivot. 0 where it is singular. */");
     Line("static inline int {}prepare({}pose* p) {{", prefix_, prefix_);
     if (!f_.closure.blocks.empty()) {
-      Line("  double r[{}];\n  int i, j, k;", LargestBlock());
+      Line("  double r[{}], fixed[{}];\n  int i, j, k;", LargestBlock(),
+           std::max<size_t>(1, most_fixed_));
       Line("  for (i = 0; i < {}RATES * {}N; ++i) p->G[i] = 0.0;", prefix_, prefix_);
     } else {
       Line("  int i;\n  for (i = 0; i < {}RATES * {}N; ++i) p->G[i] = 0.0;", prefix_, prefix_);
@@ -495,13 +538,15 @@ class CodeWriter {
       if (f_.closure.direct[k] < 0) continue;
       Line("  p->G[{}] = 1.0;", f_.closure.direct[k] * static_cast<int>(n()) + static_cast<int>(k));
     }
+    Line("  {}waves(p->x, p->t);", prefix_);
     size_t lu = 0, pivot = 0, c = 0;
     for (size_t b = 0; b < f_.closure.blocks.size(); ++b) {
       const ClosureBlock& block = f_.closure.blocks[b];
       const size_t m = block.rates.size(), known = block.known.size();
-      Line("  {}rows_{}(p->x, p->q, r, &p->lu[{}]);", prefix_, b, lu);
+      Line("  {}fixed_{}(p->x, p->q, fixed);", prefix_, b);
+      Line("  {}rows_{}(p->x, fixed, r, &p->lu[{}]);", prefix_, b, lu);
       Line("  if (!{}factor(&p->lu[{}], {}, &p->pivot[{}])) return 0;", prefix_, lu, m, pivot);
-      if (known > 0) Line("  {}others_{}(p->x, p->q, &p->c[{}]);", prefix_, b, c);
+      if (known > 0) Line("  {}others_{}(p->x, p->t, p->q, &p->c[{}]);", prefix_, b, c);
       Line("  for (k = 0; k < {}N; ++k) {{", prefix_);
       Line("    for (i = 0; i < {}; ++i) {{", m);
       Line("      r[i] = 0.0;");
@@ -529,8 +574,9 @@ class CodeWriter {
          NumberText(o_.tolerance), NumberText(f_.length));
     Line("static inline int {}closed(const double x[], const double q[]) {{", prefix_);
     const size_t gaps = f_.closure.gaps.size();
-    Line("  double r[{}];\n  int i;", std::max<size_t>(1, gaps));
-    Line("  {}gaps(x, q, r);", prefix_);
+    Line("  double r[{}], t[{}];\n  int i;", std::max<size_t>(1, gaps),
+         std::max<size_t>(1, waves_.size()));
+    Line("  {0}waves(x, t);\n  {0}gaps(x, t, q, r);", prefix_);
     Line("  for (i = 0; i < {}; ++i) {{", gaps);
     Line("    if (!(fabs(r[i]) <= {})) return 0;", NumberText(o_.tolerance));
     Line("  }}\n  return 1;\n}}");
@@ -551,10 +597,10 @@ class CodeWriter {
     Fixed(
         "\n/* Positions of the actuators. */\n"
         "static inline void @actuators(const @pose* p, double d[]) {\n"
-        "  @actuator_positions(p->x, d);\n}\n");
+        "  @actuator_positions(p->x, p->t, d);\n}\n");
     if (f_.from_actuators) {
       CClose("_by_actuators", "d", "the actuators' positions", "@actuators(p, from);",
-             "@coordinates(next.x, next.q);");
+             "@waves(next.x, next.t);\n  @coordinates(next.x, next.t, next.q);");
     }
     CMotion();
     if (o_.table) CTable();
@@ -609,7 +655,7 @@ class CodeWriter {
     bool others = false;
     for (size_t b = 0; b < blocks.size(); ++b) {
       const size_t m = blocks[b].rates.size(), known = blocks[b].known.size();
-      Line("  {}bias_{}(p->x, u, p->q, r);", prefix_, b);
+      Line("  {}bias_{}(p->x, p->t, u, p->q, r);", prefix_, b);
       Line("  for (i = 0; i < {}; ++i) {{\n    r[i] = -r[i];", m);
       if (known > 0) {
         others = true;
@@ -631,7 +677,7 @@ class CodeWriter {
     Fixed(
         "\n/* Rates of the actuators per rate of q, ACTUATORS x N by rows. */\n"
         "static inline void @jacobian(const @pose* p, double J[]) {\n");
-    Line("  double c[{}];\n  int k;\n  {}actuator_rates(p->x, c);", factors(), prefix_);
+    Line("  double c[{}];\n  int k;\n  {}actuator_rates(p->x, p->t, c);", factors(), prefix_);
     Line("  for (k = 0; k < {}N; ++k) {{", prefix_);
     for (size_t i = 0; i < actuators(); ++i) {
       Line("    J[{} + k] = {};", i * n(), ActuatorSum(i, "p->G", "k"));
@@ -644,7 +690,8 @@ class CodeWriter {
         "                                    double dd[], double ddd[]) {\n");
     Line("  double u[{0}], du[{0}], c[{1}];", std::max<size_t>(1, f_.rates.size()), factors());
     Fixed(
-        "  @motion(p, v, a, u, du);\n  @actuator_rates(p->x, c);\n  @actuator_bias(p->x, u, "
+        "  @motion(p, v, a, u, du);\n  @actuator_rates(p->x, p->t, c);\n  @actuator_bias(p->x, "
+        "p->t, u, "
         "ddd);\n");
     for (size_t i = 0; i < actuators(); ++i) {
       Line("  dd[{}] = {};", i, ActuatorSum(i, "u", ""));
@@ -674,7 +721,7 @@ static inline void @jacobian_rate(const @pose* p, const double v[], double Jd[])
     for (size_t o = 0; o < f_.outputs.size(); ++o) {
       Line("\n/* {}: x, y, z, roll, pitch, yaw in its reference frame. */", f_.outputs[o].name);
       Line("static inline void {0}pose_{1}(const {0}pose* p, double pose[]) {{", prefix_, o);
-      Line("  {}output_{}(p->x, pose);\n}}", prefix_, o);
+      Line("  {}output_{}(p->x, p->t, pose);\n}}", prefix_, o);
     }
     if (f_.forces.empty()) return;
     Fixed(
@@ -683,7 +730,7 @@ static inline void @jacobian_rate(const @pose* p, const double v[], double Jd[])
         "                           double f[]) {\n");
     Line("  double u[{0}], du[{0}], t[{0}];\n  int i, k;", std::max<size_t>(1, f_.rates.size()));
     Fixed(R"code(  @motion(p, v, a, u, du);
-  @tree_forces(p->x, u, du, t);
+  @tree_forces(p->x, p->t, u, du, t);
   for (k = 0; k < @N; ++k) {
     f[k] = 0.0;
     for (i = 0; i < @RATES; ++i) f[k] += p->G[i * @N + k] * t[i];
@@ -812,9 +859,12 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
       if (rate.ball == 0) Line("  {}turn(&p->x[{}], 0.0, 0.0, 0.0);", prefix_, rate.x);
     }
     if (!f_.closure.blocks.empty()) {
-      Line("  for (i = 0; i < {}; ++i) {{\n    double size;", table.steps);
+      Line("  {{\n    double size, fixed[{}];", std::max<size_t>(1, most_fixed_));
       for (size_t b = 0; b < f_.closure.blocks.size(); ++b) {
-        Line("    if (!{}step_{}(p->x, q, &size)) return {}SINGULAR;", prefix_, b, prefix_);
+        Line("    {}fixed_{}(p->x, q, fixed);", prefix_, b);
+        Line("    for (i = 0; i < {}; ++i) {{", table.steps);
+        Line("      if (!{}step_{}(p->x, fixed, &size)) return {}SINGULAR;\n    }}", prefix_, b,
+             prefix_);
       }
       Line("  }}");
     }
@@ -872,7 +922,9 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
   // Rates, known rates, places in lu and c, commanded rows of each block, as the functions below
   // take them.
   void PythonBlocks() {
-    Line("\n\n_BLOCKS = [  # rows, others, bias, rates, known rates, (row, coordinate, weight)");
+    Line(
+        "\n\n_BLOCKS = [  # fixed, rows, others, bias, rates, known rates, (row, coordinate, "
+        "weight)");
     for (size_t b = 0; b < f_.closure.blocks.size(); ++b) {
       const ClosureBlock& block = f_.closure.blocks[b];
       std::vector<std::string> commanded;
@@ -881,8 +933,10 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
         commanded.push_back(
             fmt::format("({}, {}, {})", i, block.commanded[i], NumberText(block.weight[i])));
       }
-      Line("    (_rows_{0}, _others_{0}, _bias_{0}, _rates_{0}, _known_{0},\n     [{1}]),", b,
-           Joined(commanded));
+      Line(
+          "    (_fixed_{0}, _rows_{0}, _others_{0}, _bias_{0}, _rates_{0}, _known_{0},\n     "
+          "[{1}]),",
+          b, Joined(commanded));
     }
     Line("]");
     std::vector<std::string> direct;
@@ -926,13 +980,14 @@ def _prepare(p):
     p.factors = []
     for rate, k in _DIRECT:
         p.G[rate * N + k] = 1.0
-    for rows, others, _, rates, known, commanded in _BLOCKS:
+    p.t = _waves(p.x)
+    for fixed, rows, others, _, rates, known, commanded in _BLOCKS:
         m = len(rates)
-        _, lu = rows(p.x, p.q)
+        _, lu = rows(p.x, fixed(p.x, p.q))
         pivot = _factor(lu, m)
         if pivot is None:
             return False
-        c = others(p.x, p.q)
+        c = others(p.x, p.t, p.q)
         p.factors.append((lu, pivot, c))
         for k in range(N):
             r = [-sum(c[i * len(known) + j] * p.G[rate * N + k] for j, rate in enumerate(known))
@@ -961,7 +1016,8 @@ def _close(p, to, start, reach, take):
     found = p.copy()
     found.x, found.q = x, take(x)
 )code");
-    Line("    if not all(abs(gap) <= {} for gap in _gaps(x, found.q)):", NumberText(o_.tolerance));
+    Line("    if not all(abs(gap) <= {} for gap in _gaps(x, _waves(x), found.q)):",
+         NumberText(o_.tolerance));
     Fixed(R"code(        return UNREACHABLE
     if not _prepare(found):
         return SINGULAR
@@ -977,14 +1033,14 @@ def close(p, q):
 
 def actuators(p):
     """Their positions."""
-    return _actuator_positions(p.x)
+    return _actuator_positions(p.x, p.t)
 )code");
     if (f_.from_actuators) {
       Fixed(R"code(
 
 def close_by_actuators(p, d):
     """As close(), to positions of the actuators."""
-    return _close(p, list(d), actuators(p), _reachd, _coordinates)
+    return _close(p, list(d), actuators(p), _reachd, lambda x: _coordinates(x, _waves(x)))
 )code");
     }
     Fixed(R"code(
@@ -994,8 +1050,8 @@ def _motion(p, v, a):
     du = [0.0] * RATES
     for rate, k in _DIRECT:
         du[rate] = a[k]
-    for (_, _, bias, rates, known, commanded), (lu, pivot, c) in zip(_BLOCKS, p.factors):
-        r = [-value for value in bias(p.x, u, p.q)]
+    for (_, _, _, bias, rates, known, commanded), (lu, pivot, c) in zip(_BLOCKS, p.factors):
+        r = [-value for value in bias(p.x, p.t, u, p.q)]
         for i in range(len(rates)):
             r[i] -= sum(c[i * len(known) + j] * du[rate] for j, rate in enumerate(known))
         for i, coordinate, weight in commanded:
@@ -1008,7 +1064,7 @@ def _motion(p, v, a):
 
 def jacobian(p):
     """Rates of the actuators per rate of q: a list per actuator."""
-    c = _actuator_rates(p.x)
+    c = _actuator_rates(p.x, p.t)
     return [[sum(c[at] * p.G[rate * N + k] for rate, at in parts) for k in range(N)]
             for parts in _ACTUATORS]
 
@@ -1016,7 +1072,7 @@ def jacobian(p):
 def actuator_motion(p, v, a):
     """Rates and accelerations of the actuators."""
     u, du = _motion(p, v, a)
-    c, bias = _actuator_rates(p.x), _actuator_bias(p.x, u)
+    c, bias = _actuator_rates(p.x, p.t), _actuator_bias(p.x, p.t, u)
     return ([sum(c[at] * u[rate] for rate, at in parts) for parts in _ACTUATORS],
             [b + sum(c[at] * du[rate] for rate, at in parts) for b, parts in zip(bias, _ACTUATORS)])
 
@@ -1036,7 +1092,7 @@ def jacobian_rate(p, v):
       Line("\n\ndef pose_{}(p):", o);
       Line("    \"\"\"{}: x, y, z, roll, pitch, yaw in its reference frame.\"\"\"",
            f_.outputs[o].name);
-      Line("    return _output_{}(p.x)", o);
+      Line("    return _output_{}(p.x, p.t)", o);
     }
     if (!f_.forces.empty()) {
       Fixed(R"code(
@@ -1044,7 +1100,7 @@ def jacobian_rate(p, v):
 def forces(p, v, a):
     """Forces that the motion needs along each coordinate."""
     u, du = _motion(p, v, a)
-    t = _tree_forces(p.x, u, du)
+    t = _tree_forces(p.x, p.t, u, du)
     return [sum(p.G[i * N + k] * t[i] for i in range(RATES)) for k in range(N)]
 )code");
     }
@@ -1114,9 +1170,10 @@ def inverse_dynamics(p, v, a, more=None):
       if (rate.ball == 0) Line("    _turn(p.x, {}, 0.0, 0.0, 0.0)", rate.x);
     }
     if (!f_.closure.blocks.empty()) {
-      Line("    for _ in range({}):", table.steps);
       for (size_t b = 0; b < f_.closure.blocks.size(); ++b) {
-        Line("        if _step_{}(p.x, q) is None:\n            return SINGULAR", b);
+        Line("    fixed = _fixed_{}(p.x, q)", b);
+        Line("    for _ in range({}):", table.steps);
+        Line("        if _step_{}(p.x, fixed) is None:\n            return SINGULAR", b);
       }
     }
     Line("    return OK if _prepare(p) else SINGULAR");
@@ -1152,6 +1209,8 @@ def self_test():
   const bool python_;
   const std::string prefix_;
   std::string text_;
+  std::vector<Expr> waves_;
+  size_t most_fixed_ = 1;  ///< of the blocks so far
 };
 
 }  // namespace

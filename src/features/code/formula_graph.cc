@@ -220,6 +220,47 @@ std::vector<Expr> FormulaGraph::Derivatives(const std::vector<Expr>& of,
   return result;
 }
 
+std::vector<Expr> FormulaGraph::FixedParts(const std::vector<Expr>& of,
+                                           const std::vector<Expr>& moving) const {
+  std::vector<bool> moves(nodes_.size(), false), wanted(nodes_.size(), false);
+  for (const Expr& input : moving) moves[static_cast<size_t>(input.id())] = true;
+  const auto moved = [&](int id) { return id >= 0 && moves[static_cast<size_t>(id)]; };
+  const auto plain = [&](size_t i) {
+    return nodes_[i].op == FormulaOp::kNumber || nodes_[i].op == FormulaOp::kInput;
+  };
+  for (size_t i = 0; i < nodes_.size(); ++i) {
+    if (!plain(i)) moves[i] = moved(nodes_[i].a) || moved(nodes_[i].b);
+  }
+  for (const Expr& e : of) wanted[static_cast<size_t>(e.id())] = true;
+  for (size_t i = nodes_.size(); i-- > 0;) {
+    if (!wanted[i] || plain(i) || !moves[i]) continue;
+    if (nodes_[i].a >= 0) wanted[static_cast<size_t>(nodes_[i].a)] = true;
+    if (nodes_[i].b >= 0) wanted[static_cast<size_t>(nodes_[i].b)] = true;
+  }
+  std::vector<Expr> parts;
+  for (size_t i = 0; i < nodes_.size(); ++i) {
+    // Inputs that are fixed count, too: what is left is a function of `moving` and the parts.
+    const bool input = nodes_[i].op == FormulaOp::kInput;
+    if (wanted[i] && !moves[i] && (!plain(i) || input)) {
+      parts.push_back(Expr(Expr::ById(), static_cast<int>(i)));
+    }
+  }
+  return parts;
+}
+
+std::vector<Expr> FormulaGraph::WavesOf(const std::vector<Expr>& of) const {
+  const std::vector<bool> needed = Needed(of);
+  std::vector<Expr> waves;
+  for (size_t i = 0; i < needed.size(); ++i) {
+    const Node& node = nodes_[i];
+    if (!needed[i] || (node.op != FormulaOp::kSine && node.op != FormulaOp::kCosine)) continue;
+    if (nodes_[static_cast<size_t>(node.a)].op == FormulaOp::kInput) {
+      waves.push_back(Expr(Expr::ById(), static_cast<int>(i)));
+    }
+  }
+  return waves;
+}
+
 FormulaTape::FormulaTape(const std::vector<Expr>& of) {
   const FormulaGraph& graph = FormulaGraph::Open();
   const std::vector<bool> needed = graph.Needed(of);
@@ -247,19 +288,21 @@ namespace {
 enum Binding { kSum = 0, kProduct = 1, kFactor = 2, kName = 3 };
 }  // namespace
 
-FormulaText::FormulaText(const std::vector<Expr>& of, const std::string& call)
+FormulaText::FormulaText(const std::vector<Expr>& of, const std::string& call,
+                         const std::vector<Expr>& given, const std::string& given_name)
     : graph_(FormulaGraph::Open()),
       call_(call),
       uses_(graph_.nodes_.size(), 0),
       named_(graph_.nodes_.size()) {
-  const std::vector<bool> needed = graph_.Needed(of);
+  for (size_t i = 0; i < given.size(); ++i) {
+    named_[static_cast<size_t>(given[i].id())] = fmt::format("{}[{}]", given_name, i);
+  }
   for (const Expr& e : of) ++uses_[static_cast<size_t>(e.id())];
-  for (size_t i = 0; i < needed.size(); ++i) {
+  for (size_t i = uses_.size(); i-- > 0;) {
     const FormulaGraph::Node& node = graph_.nodes_[i];
-    if (!needed[i] || node.op == FormulaOp::kInput) continue;
+    if (uses_[i] == 0 || node.op == FormulaOp::kInput || !named_[i].empty()) continue;
     if (node.a >= 0) ++uses_[static_cast<size_t>(node.a)];
-    if (node.b >= 0 && node.b != node.a) ++uses_[static_cast<size_t>(node.b)];
-    if (node.b >= 0 && node.b == node.a) ++uses_[static_cast<size_t>(node.a)];
+    if (node.b >= 0) ++uses_[static_cast<size_t>(node.b)];
   }
   for (const Expr& e : of) results_.push_back(TextOf(e.id(), kSum));
 }
@@ -320,16 +363,16 @@ std::string FormulaText::TextOf(int id, int binding) {
       break;
   }
   if (uses_[i] > 1 || text.size() > kLongest) {
-    named_[i] = fmt::format("t{}", statements_.size() + 1);
+    named_[i] = fmt::format("e{}", statements_.size() + 1);
     statements_.emplace_back(named_[i], text);
     return named_[i];
   }
   return own < binding ? "(" + text + ")" : text;
 }
 
-bool FormulaText::Uses(const std::vector<Expr>& inputs) const {
+bool FormulaText::Uses(const std::vector<Expr>& parts) const {
   return std::ranges::any_of(
-      inputs, [this](const Expr& input) { return uses_[static_cast<size_t>(input.id())] > 0; });
+      parts, [this](const Expr& part) { return uses_[static_cast<size_t>(part.id())] > 0; });
 }
 
 }  // namespace mbv

@@ -70,6 +70,11 @@ class FormulaGraph {
   /// Σ ∂of/∂input · rate, for inputs with a rate; all others are constant.
   [[nodiscard]] std::vector<Expr> Derivatives(const std::vector<Expr>& of,
                                               const std::vector<std::pair<Expr, Expr>>& rates);
+  /// The largest parts of formulas that do not contain `moving` inputs, but for numbers.
+  [[nodiscard]] std::vector<Expr> FixedParts(const std::vector<Expr>& of,
+                                             const std::vector<Expr>& moving) const;
+  /// Sines and cosines of inputs in them.
+  [[nodiscard]] std::vector<Expr> WavesOf(const std::vector<Expr>& of) const;
 
  private:
   friend class FormulaTape;
@@ -135,17 +140,18 @@ class FormulaTape {
   std::vector<size_t> results_;
 };
 
-/// Statements "t1 = a*b" and what stands for each formula; a formula that is used twice has a name.
+/// Statements "e1 = a*b" and what stands for each formula; a formula that is used twice has a name.
 class FormulaText {
  public:
-  /// `call`: before the name of the sign function.
-  explicit FormulaText(const std::vector<Expr>& of, const std::string& call);
+  /// `call`: the sign function. `given`: parts that have values already, as GIVEN[0] ….
+  FormulaText(const std::vector<Expr>& of, const std::string& call,
+              const std::vector<Expr>& given = {}, const std::string& given_name = "");
   [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& statements() const {
     return statements_;
   }
   [[nodiscard]] const std::vector<std::string>& results() const { return results_; }
-  /// Whether any of these inputs is in them.
-  [[nodiscard]] bool Uses(const std::vector<Expr>& inputs) const;
+  /// Whether any of these inputs or given parts is in them.
+  [[nodiscard]] bool Uses(const std::vector<Expr>& parts) const;
 
  private:
   [[nodiscard]] std::string TextOf(int id, int binding);
