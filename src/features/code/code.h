@@ -21,13 +21,13 @@ struct CodeRange {
 };
 
 struct CodeSettings {
-  std::string name;                    ///< before all names in C; "": of the mechanism
+  std::string name = {};                    ///< before all names in C; "": of the mechanism
   std::vector<CodeRange> ranges = {};  ///< of all coordinates: with a table to start from
   size_t states = 10000;               ///< that it is judged by
   std::uint64_t seed = 1;
   std::string check = {};  ///< another header with the same functions, to be judged instead
   bool compile = true;
-  std::string origin;  ///< for the head: how the model is called
+  std::string origin = {};  ///< for the head: how the model is called
 };
 
 /// How code compares with the reference.

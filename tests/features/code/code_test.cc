@@ -1,0 +1,402 @@
+// Code of mechanisms: compiled, run and held against the reference; with slips, it has to differ.
+#include "features/code/code.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+#include "base/files.h"
+#include "model_file/load_model.h"
+#include "tests/support/run_program.h"
+#include "tests/support/shipped.h"
+#include "tests/support/source_dir.h"
+#include "verify/model_text.h"
+
+namespace mbv {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double kDeg = std::numbers::pi / 180.0;
+
+Mechanism Loaded(const std::string& file) {
+  LoadResult loaded = LoadRobot(SourcePath(file), {});
+  EXPECT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  return loaded.mechanism.value_or(Mechanism());
+}
+Mechanism Ankle() { return Loaded("/tests/mechanisms/parallel_ankle.yaml"); }
+
+CodeTask TaskOf(const Mechanism& mechanism, const std::vector<std::string>& coordinates = {}) {
+  Diagnostics found;
+  std::optional<CodeTask> task = ChooseCodeTask(mechanism, coordinates, &found);
+  EXPECT_TRUE(task.has_value()) << found.Text();
+  return task.value_or(CodeTask());
+}
+
+const std::vector<std::string> kAnkle = {"ankle.0", "ankle.1"};
+std::vector<CodeRange> AnkleRanges(double share = 1.0) {
+  return {{"ankle.0", -50 * share * kDeg, 30 * share * kDeg},
+          {"ankle.1", -15 * share * kDeg, 15 * share * kDeg}};
+}
+
+std::string FileOf(const CodeResult& result, const std::string& name) {
+  for (const auto& [file, content] : result.files) {
+    if (file == name) return content;
+  }
+  ADD_FAILURE() << name;
+  return "";
+}
+
+std::string Described(const CodeResult& result) {
+  return result.diagnostics.Text() + ToText(result);
+}
+
+class CodeOfShipped : public testing::TestWithParam<std::string> {};
+
+// In C without a warning, and in Python.
+TEST_P(CodeOfShipped, AgreesWithTheReference) {
+  const Mechanism mechanism = Loaded("/models/" + GetParam() + "/model.yaml");
+  const CodeResult result = MakeCode(mechanism, TaskOf(mechanism), {.states = 60});
+  ASSERT_FALSE(result.diagnostics.has_errors()) << result.diagnostics.Text();
+  ASSERT_EQ(result.judgements.size(), 2U);
+  EXPECT_TRUE(result.agrees());
+  for (const CodeJudgement& judgement : result.judgements) {
+    EXPECT_THAT(judgement.not_judged, IsEmpty());
+    EXPECT_TRUE(judgement.agrees()) << Described(result);
+    EXPECT_THAT(judgement.warnings, IsEmpty());
+    EXPECT_GT(judgement.states, 30U);
+    EXPECT_LT(judgement.position, 1e-12) << Described(result);
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Models, CodeOfShipped, testing::ValuesIn(ShippedModelNames()),
+                         [](const auto& at) { return at.param; });
+
+class CodeOfAnkle : public testing::Test {
+ protected:
+  CodeResult Make(CodeSettings settings) const {
+    return MakeCode(mechanism_, TaskOf(mechanism_, kAnkle), settings);
+  }
+  // A header with more text before its end, judged.
+  CodeJudgement Judged(const std::string& header, const std::string& more) {
+    const size_t end = header.rfind("#endif");
+    const std::filesystem::path file = place_.folder() / "edited.h";
+    EXPECT_EQ(WriteFile(file, header.substr(0, end) + more + header.substr(end)), "");
+    const CodeResult result = Make({.states = 100, .check = file.string()});
+    EXPECT_EQ(result.judgements.size(), 1U) << result.diagnostics.Text();
+    EXPECT_FALSE(result.agrees());
+    return result.judgements.empty() ? CodeJudgement() : result.judgements[0];
+  }
+  // `name` is called as `body` says; the original is NAME_.
+  static std::string Instead(const std::string& name, const std::string& arguments,
+                             const std::string& body) {
+    return fmt::format(
+        "static inline int slip_{0}({1}) {{\n{2}\n}}\n#define parallel_ankle_{0} slip_{0}\n", name,
+        arguments, body);
+  }
+
+  const Mechanism mechanism_ = Ankle();
+  Program place_{testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(CodeOfAnkle, NamesPlantedSlips) {
+  const std::string header = FileOf(Make({.states = 20, .compile = false}), "parallel_ankle.h");
+  const auto closing = [](const std::string& change) {
+    return Instead("close", "parallel_ankle_pose* p, const double to[]",
+                   "double q[2];\n" + change + "\nreturn parallel_ankle_close(p, q);");
+  };
+  const auto forces = [](const std::string& change) {
+    return Instead("inverse_dynamics",
+                   "const parallel_ankle_pose* p, const double v[], const double a[], const double "
+                   "more[], double tau[]",
+                   "const int s = parallel_ankle_inverse_dynamics(p, v, a, more, tau);\n" + change +
+                       "\nreturn s;");
+  };
+  const auto positions = [](const std::string& change) {
+    return "static inline void slip_actuators(const parallel_ankle_pose* p, double d[]) {\n"
+           "  parallel_ankle_actuators(p, d);\n" +
+           change + "\n}\n#define parallel_ankle_actuators slip_actuators\n";
+  };
+  const std::vector<std::pair<std::string, testing::Matcher<std::string>>> slips = {
+      {closing("q[0] = to[1]; q[1] = to[0];"), HasSubstr("'ankle.0' and 'ankle.1' are exchanged")},
+      {closing("q[0] = to[0]; q[1] = -to[1];"), AllOf(HasSubstr("'ankle.1'"), HasSubstr("sign"))},
+      {closing("q[0] = to[0] * 0.017453292519943295; q[1] = to[1] * 0.017453292519943295;"),
+       HasSubstr("degrees")},
+      {positions("const double t = d[0]; d[0] = d[1]; d[1] = t;"),
+       AllOf(HasSubstr("'left' is that of 'right'"), HasSubstr("'right' is that of 'left'"))},
+      {positions("d[1] = -d[1];"), HasSubstr("the position of 'right' has the other sign")},
+      {positions("d[0] *= 57.29577951308232;"), HasSubstr("the position of 'left' is in degrees")},
+      {forces("{ const double t = tau[0]; tau[0] = tau[1]; tau[1] = t; }"),
+       HasSubstr("the force of 'left' is that of 'right'")},
+      {forces("tau[0] = -tau[0];"), HasSubstr("the force of 'left' has the other sign")}};
+  for (const auto& [more, named] : slips) {
+    const CodeJudgement judgement = Judged(header, more);
+    EXPECT_EQ(judgement.not_judged, "") << more;
+    EXPECT_THAT(judgement.slip, named) << more;
+  }
+}
+
+// The left crank turned over: another way to close the loop with the same ankle.
+TEST_F(CodeOfAnkle, NamesAnotherBranch) {
+  const std::string header = FileOf(Make({.states = 20, .compile = false}), "parallel_ankle.h");
+  const std::string flipped = Instead("close", "parallel_ankle_pose* p, const double to[]",
+                                      "const int s = parallel_ankle_close(p, to);\n"
+                                      "p->x[2] += 3.1;\np->x[4] -= 3.1;\n"
+                                      "return s != 0 ? s : parallel_ankle_reach(p->x, to) == 0 && "
+                                      "parallel_ankle_prepare(p) ? 0 : 2;");
+  const CodeJudgement judgement = Judged(header, flipped);
+  EXPECT_EQ(judgement.not_judged, "");
+  EXPECT_THAT(judgement.slip, HasSubstr("another branch"));
+}
+
+TEST_F(CodeOfAnkle, DiffersFromAModelThatIsSlightlyAnother) {
+  const std::string header = FileOf(Make({.states = 20, .compile = false}), "parallel_ankle.h");
+  LoadOptions longer;
+  longer.overrides = {{"rod", 0.24 * (1.0 + 1e-8)}};
+  LoadResult loaded = LoadRobot(SourcePath("/tests/mechanisms/parallel_ankle.yaml"), longer);
+  ASSERT_TRUE(loaded.mechanism.has_value());
+  const std::filesystem::path file = place_.folder() / "parallel_ankle.h";
+  ASSERT_EQ(WriteFile(file, header), "");
+  const CodeResult result = MakeCode(*loaded.mechanism, TaskOf(*loaded.mechanism, kAnkle),
+                                     {.states = 100, .check = file.string()});
+  ASSERT_EQ(result.judgements.size(), 1U);
+  EXPECT_FALSE(result.agrees());
+  EXPECT_GT(result.judgements[0].position, 1e-9);
+}
+
+TEST_F(CodeOfAnkle, ThatDoesNotCompileDiffers) {
+  const std::string header = FileOf(Make({.states = 20, .compile = false}), "parallel_ankle.h");
+  EXPECT_THAT(Judged(header, "this is no C\n").not_judged, HasSubstr("does not compile"));
+}
+
+// The table: all of the range is proved, the same poses as by the way from home, and fewer steps
+// than proved leave more.
+TEST_F(CodeOfAnkle, StartsFromAProvedTable) {
+  const CodeResult result = Make({.ranges = AnkleRanges(), .states = 300});
+  ASSERT_EQ(result.judgements.size(), 3U) << Described(result);
+  EXPECT_TRUE(result.agrees()) << Described(result);
+  EXPECT_EQ(result.table_share, 1.0);
+  EXPECT_LE(result.table_bound, 1e-12);
+  EXPECT_EQ(result.judgements[1].language, "C, from the table");
+  EXPECT_EQ(result.judgements[1].states, 300U);
+  std::string fewer = FileOf(result, "parallel_ankle.h");
+  for (size_t at = fewer.find("i < 3; ++i) {\n      if (!parallel_ankle_step_");
+       at != std::string::npos;
+       at = fewer.find("i < 3; ++i) {\n      if (!parallel_ankle_step_", at)) {
+    fewer[at + 4] = '1';
+  }
+  const std::filesystem::path file = place_.folder() / "fewer.h";
+  ASSERT_EQ(WriteFile(file, fewer), "");
+  const CodeResult worse = Make({.ranges = AnkleRanges(), .states = 100, .check = file.string()});
+  ASSERT_EQ(worse.judgements.size(), 2U) << Described(worse);
+  EXPECT_TRUE(worse.judgements[0].agrees());
+  EXPECT_FALSE(worse.judgements[1].agrees()) << Described(worse);
+}
+
+// Ends before the loops do not close any more: nothing out of reach is served.
+TEST_F(CodeOfAnkle, TableEndsWhereTheRodsDo) {
+  const std::vector<CodeRange> wide = {{"ankle.0", -2.0, 2.0}, {"ankle.1", -0.9, 0.9}};
+  const CodeResult result = Make({.ranges = wide, .states = 2000});
+  ASSERT_EQ(result.judgements.size(), 3U) << Described(result);
+  EXPECT_GT(result.table_share, 0.3);
+  EXPECT_LT(result.table_share, 0.95);
+  EXPECT_TRUE(result.judgements[1].agrees()) << Described(result);
+}
+
+TEST_F(CodeOfAnkle, LooksUpWithinTheBound) {
+  CodeResult result = Make({.ranges = AnkleRanges(0.5), .states = 2000});
+  ASSERT_TRUE(result.lookup.has_value()) << Described(result);
+  EXPECT_EQ(result.lookup_share, 1.0);
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    EXPECT_GT(result.lookup_error[k], 0.0);
+    EXPECT_LE(result.lookup_error[k], result.lookup->bound[k]);
+    EXPECT_LT(result.lookup->bound[k], 100.0 * result.lookup_error[k]);
+  }
+  // Slopes against differences.
+  VecX m, up, down;
+  MatX slopes, none;
+  std::mt19937_64 random(3);  // NOLINT(cert-msc51-cpp): the same each time
+  std::uniform_real_distribution<double> one(-0.2, 0.1);
+  for (int i = 0; i < 50; ++i) {
+    const VecX q = Eigen::Vector2d(one(random), one(random));
+    const VecX h = Eigen::Vector2d(1e-9, 0.0);
+    ASSERT_TRUE(result.lookup->At(q, &m, &slopes));
+    ASSERT_TRUE(result.lookup->At(q + h, &up, &none) && result.lookup->At(q - h, &down, &none));
+    EXPECT_NEAR(slopes(0, 0), (up[0] - down[0]) / 2e-9, 1e-5);
+  }
+  EXPECT_FALSE(result.lookup->At(Eigen::Vector2d(1.0, 0.0), &m, &slopes));
+  // A wrong node is beyond the bound.
+  result.lookup_error[0] = result.lookup->bound[0] * 1.001;
+  EXPECT_FALSE(result.agrees());
+}
+
+// The bound follows the spacing's square, as of interpolation.
+TEST_F(CodeOfAnkle, LookupBoundFallsWithTheSquareOfTheSpacing) {
+  const CodeResult wide = Make({.ranges = AnkleRanges(0.5), .states = 20, .compile = false});
+  const CodeResult narrow = Make({.ranges = AnkleRanges(0.25), .states = 20, .compile = false});
+  ASSERT_TRUE(wide.lookup && narrow.lookup);
+  const double ratio = wide.lookup->bound[0] / narrow.lookup->bound[0];
+  EXPECT_GT(ratio, 3.5);
+  EXPECT_LT(ratio, 9.0);
+}
+
+// Of what a controller calls in each cycle.
+TEST_F(CodeOfAnkle, NeedsLittleStackAndNoLibrary) {
+  const CodeResult result = Make({.ranges = AnkleRanges(0.2), .states = 20, .compile = false});
+  const std::filesystem::path folder = place_.folder();
+  for (const auto& [name, content] : result.files) ASSERT_EQ(WriteFile(folder / name, content), "");
+  ASSERT_EQ(WriteFile(folder / "cycle.c", R"(#include "parallel_ankle.h"
+#include "parallel_ankle_lookup.h"
+int cycle(parallel_ankle_pose* p, const double q[], const double v[], const double a[], double d[],
+          double tau[]);
+int cycle(parallel_ankle_pose* p, const double q[], const double v[], const double a[], double d[],
+          double tau[]) {
+  const int s = parallel_ankle_at(p, q);
+  if (s != parallel_ankle_OK) return s;
+  if (!parallel_ankle_lookup(q, d, tau)) return parallel_ankle_OUTSIDE;
+  parallel_ankle_actuators(p, d);
+  return parallel_ankle_inverse_dynamics(p, v, a, 0, tau);
+}
+)"),
+            "");
+  const auto call = [&](const std::string& command) {
+    return place_.Script("cd '" + folder.string() + "' && " + command);
+  };
+  const ProgramResult built =
+      call("cc -std=c99 -O2 -Wall -Wextra -Wconversion -pedantic -Werror -fstack-usage -c cycle.c");
+  ASSERT_EQ(built.exit_code, 0) << built.err;
+  std::ifstream usage(folder / "cycle.su");
+  std::string where, kind;
+  int bytes = 0, sum = 0;
+  while (usage >> where >> bytes >> kind) {
+    EXPECT_EQ(kind, "static") << where;
+    sum += bytes;
+  }
+  EXPECT_GT(sum, 0);
+  EXPECT_LE(sum, 2048);
+  const ProgramResult names = call("nm -u cycle.o");
+  for (const char* name : {"malloc", "free", "mem", "printf"}) {
+    EXPECT_THAT(names.out, testing::Not(HasSubstr(name)));
+  }
+}
+
+class CodeByCompiler : public CodeOfAnkle, public testing::WithParamInterface<const char*> {};
+
+// The self-test of the files, as their users build it.
+TEST_P(CodeByCompiler, PassesItsSelfTest) {
+  const std::string command = GetParam();
+  const std::string compiler = command.substr(0, command.find(' '));
+  const CodeResult result = Make({.ranges = AnkleRanges(0.2), .states = 20, .compile = false});
+  const std::filesystem::path folder = place_.folder();
+  for (const auto& [name, content] : result.files) ASSERT_EQ(WriteFile(folder / name, content), "");
+  const bool arm = compiler.starts_with("arm");
+  if (arm && place_.Script("command -v " + compiler + " qemu-arm").exit_code != 0) {
+    GTEST_SKIP() << compiler << " or qemu-arm is not installed";
+  }
+  const ProgramResult done =
+      place_.Script("cd '" + folder.string() + "' && " + command +
+                    " parallel_ankle_test.c -o self -lm && " + (arm ? "qemu-arm " : "") + "./self");
+  ASSERT_EQ(done.exit_code, 0) << done.out << done.err;
+  EXPECT_THAT(done.err, IsEmpty());
+  EXPECT_LT(std::strtod(done.out.c_str(), nullptr), 1e-12);
+  // A wrong number in it is seen.
+  std::string wrong = FileOf(result, "parallel_ankle.h");
+  const size_t row = wrong.find("tests[][");
+  const size_t digit =
+      wrong.find_first_of("123456789", wrong.find('\n', wrong.find('{', wrong.find('\n', row))));
+  wrong[digit] = wrong[digit] == '1' ? '2' : '1';
+  ASSERT_EQ(WriteFile(folder / "parallel_ankle.h", wrong), "");
+  EXPECT_NE(
+      place_
+          .Script("cd '" + folder.string() + "' && " + command +
+                  " parallel_ankle_test.c -o self -lm && " + (arm ? "qemu-arm " : "") + "./self")
+          .exit_code,
+      0);
+}
+INSTANTIATE_TEST_SUITE_P(
+    Compilers, CodeByCompiler,
+    testing::Values("cc -std=c99 -O2 -Wall -Wextra -Wconversion -pedantic -Werror",
+                    "clang -std=c99 -O1 -Wall -Wextra -Wconversion -pedantic -Werror",
+                    "arm-none-eabi-gcc -std=c99 -O2 -Wall -Wextra -Werror --specs=rdimon.specs"),
+    [](const auto& at) {
+      std::string name = at.param;
+      name = name.substr(0, name.find(' '));
+      std::erase_if(name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; });
+      return name;
+    });
+
+// J̇ against differences of J along the motion.
+TEST_F(CodeOfAnkle, JacobianRateIsTheJacobiansDerivative) {
+  const CodeResult result = Make({.states = 20, .compile = false});
+  ASSERT_EQ(WriteFile(place_.folder() / "parallel_ankle.py", FileOf(result, "parallel_ankle.py")),
+            "");
+  ASSERT_EQ(WriteFile(place_.folder() / "rate.py", R"(import parallel_ankle as code
+q, v, h = [0.1, -0.12], [0.7, -1.1], 1e-5
+def jacobian(t):
+    p = code.Pose()
+    assert code.close(p, [x + t * y for x, y in zip(q, v)]) == code.OK
+    return code.jacobian(p)
+p = code.Pose()
+assert code.close(p, q) == code.OK
+worst = max(abs(r - (a - b) / (2 * h)) for rates, up, down in
+            zip(code.jacobian_rate(p, v), jacobian(h), jacobian(-h)) for r, a, b in zip(rates, up, down))
+largest = max(abs(r) for row in code.jacobian_rate(p, v) for r in row)
+assert largest > 0.1
+print(worst)
+)"),
+            "");
+  const ProgramResult done =
+      place_.Script("cd '" + place_.folder().string() + "' && python3 rate.py");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_LT(std::strtod(done.out.c_str(), nullptr), 1e-8);
+}
+
+// What formulas cannot say is refused or said.
+TEST(Code, SaysWhatItHasNot) {
+  const Mechanism redundant = Loaded("/models/redundant_five_bar/model.yaml");
+  EXPECT_THAT(MakeCode(redundant, TaskOf(redundant), {.states = 20, .compile = false}).notes,
+              testing::Contains(HasSubstr("no forces of actuators: 3 for 2 coordinates")));
+  const Mechanism bushed = Loaded("/models/bushed_linkage/model.yaml");
+  EXPECT_THAT(MakeCode(bushed, TaskOf(bushed), {.states = 20, .compile = false}).notes,
+              testing::Contains(HasSubstr("no forces: there is a bushing")));
+  const Mechanism journal = Loaded("/models/journal_crank/model.yaml");
+  EXPECT_THAT(MakeCode(journal, TaskOf(journal), {.states = 20, .compile = false}).notes,
+              testing::Contains(HasSubstr("grows with its load")));
+}
+
+TEST(Code, RefusesCoordinatesThatDoNotDo) {
+  const Mechanism ankle = Ankle();
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+      {{"ankle.0"}, "2 degrees of freedom"},
+      {{"ankle.0", "ankle.1", "left"}, "depend on those before: left"},
+      {{"ankle.0", "ankle.3"}, "no coordinate 'ankle.3'"},
+      {{"ankle.0", "ankle.0"}, "chosen twice"}};
+  for (const auto& [coordinates, why] : wrong) {
+    Diagnostics found;
+    EXPECT_FALSE(ChooseCodeTask(ankle, coordinates, &found).has_value());
+    EXPECT_THAT(found.Text(), HasSubstr(why));
+  }
+}
+
+// Names of a model become such as C and Python have, and nothing in them ends a comment.
+TEST(Code, TakesAnyNames) {
+  std::string text = ReadWholeFile(SourcePath("/models/four_bar/model.yaml")).value_or("");
+  const size_t at = text.find("name: four_bar");
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, 14, "name: 4-bar");
+  LoadResult loaded = LoadModelText(text, "model.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const CodeResult result = MakeCode(*loaded.mechanism, TaskOf(*loaded.mechanism),
+                                     {.states = 20, .origin = "a */ b \"\"\" \\ c"});
+  EXPECT_TRUE(result.agrees()) << Described(result);
+  EXPECT_EQ(result.name, "m_4_bar");
+}
+
+}  // namespace
+}  // namespace mbv
