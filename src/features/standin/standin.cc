@@ -198,12 +198,20 @@ class StandinComputer {
  public:
   StandinComputer(const Mechanism& mechanism, const StandinSettings& settings,
                   const std::function<void(double)>& progress)
-      : mechanism_(mechanism), settings_(settings), progress_(progress) {}
+      : robot_(mechanism), settings_(settings), progress_(progress) {}
 
   StandinResult Compute(const std::vector<std::string>& joints) {
-    auto found = FindTransmission(mechanism_, joints, &result_.diagnostics);
+    auto found = FindTransmission(robot_, joints, &result_.diagnostics);
     if (!found) return std::move(result_);
     transmission_ = *std::move(found);
+    result_.held = NamesOf(transmission_.held);
+    result_.notes = transmission_.notes;
+    mechanism_ = MovingPart(robot_, transmission_);
+    if (Diagnostics unseen; auto moving = FindTransmission(mechanism_, joints, &unseen)) {
+      transmission_ = *std::move(moving);
+    } else {
+      mechanism_ = robot_;
+    }
     n_ = static_cast<Eigen::Index>(joints.size());
     parts_.emplace(transmission_);
     Describe();
@@ -225,13 +233,11 @@ class StandinComputer {
 
  private:
   void Error(std::string message, std::string hint) {
-    result_.diagnostics.AddError(mechanism_.file, std::move(message), std::move(hint));
+    result_.diagnostics.AddError(robot_.file, std::move(message), std::move(hint));
   }
 
   void Describe() {
     result_.joints = NamesOf(transmission_.joints);
-    result_.held = NamesOf(transmission_.held);
-    result_.notes = transmission_.notes;
     for (const NamedCoordinate& joint : transmission_.joints) {
       result_.joint_units.push_back(CoordinateUnit(mechanism_, joint.coordinate));
     }
@@ -255,7 +261,7 @@ class StandinComputer {
     const std::string &drive = result_.drive_units[0], &joint = result_.joint_units[0];
     result_.unit = drive == joint ? "1" : drive + "/" + joint;
     if (!joints_differ_ && !differ(result_.drive_units)) return;
-    const double length = CharacteristicLength(mechanism_);
+    const double length = CharacteristicLength(robot_);
     result_.unit = fmt::format("1, lengths in {:.4g} m", length);
     for (Eigen::Index k = 0; k < n_; ++k) {
       if (result_.drive_units[At(k)] == "m") scale_.drives[k] = length;
@@ -599,7 +605,8 @@ class StandinComputer {
     result_.scenes.push_back(std::move(scene));
   }
 
-  const Mechanism& mechanism_;
+  const Mechanism& robot_;
+  Mechanism mechanism_;  ///< its moving part
   const StandinSettings& settings_;
   const std::function<void(double)>& progress_;
   Transmission transmission_;

@@ -9,6 +9,8 @@
 #include "base/text.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
+#include "kinematics/mobility.h"
+#include "mechanism/spanning_tree.h"
 #include "reference/reduced_model.h"
 
 namespace mbv {
@@ -32,7 +34,9 @@ class TransmissionFinder {
       : mechanism_(mechanism), names_(names), diagnostics_(*diagnostics) {}
 
   std::optional<Transmission> Find() {
-    if (!ReadJoints() || !CheckIndependent() || !FindDrives() || !FindHeld()) return std::nullopt;
+    if (!ReadJoints() || !CheckIndependent()) return std::nullopt;
+    FindWay();
+    if (!FindDrives() || !FindHeld()) return std::nullopt;
     FindLoopBodies();
     MakeParts();
     return std::move(found_);
@@ -164,17 +168,105 @@ class TransmissionFinder {
       (drive ? drives : passive).push_back(mover.name);
       if (drive) found_.drives.push_back(mover.coordinate.index);
     }
-    if (!passive.empty()) {
-      return Error(fmt::format("{} of the chosen joints' motion no drive holds",
-                               passive.size() == 1 ? "a part" : "parts"),
-                   "a drive is needed that moves " + Joined(passive, kNamed));
-    }
+    if (!passive.empty()) return RefusePassive(passive);
     if (!RefuseRedundant(choice, candidates, fixed, model.DriveRates(T), movers)) return false;
     if (found_.drives.size() == found_.joints.size()) return true;
     if (drives.empty()) return Error("no drive moves " + Joined(names_), "choose driven joints");
+    if (HoldDrivesAbove(chosen, movers, T, model.states())) return true;
     return Error(fmt::format("{} drives move the {} chosen joint{}: {}", drives.size(),
                              names_.size(), names_.size() == 1 ? "" : "s", Joined(drives, kNamed)),
                  SetThatDoes());
+  }
+
+  // `passive`: coordinates without a drive that move the chosen joints.
+  bool RefusePassive(const std::vector<std::string>& passive) {
+    if (mechanism_.drives.empty()) {
+      return Error("the robot has no drive: what moves " + Joined(names_, kNamed) + " is not known",
+                   "name its motors: actuators in MJCF, name_mot in the closure file of a URDF, "
+                   "drives in a model.yaml");
+    }
+    std::string hint =
+        Joined(passive, kNamed) + ": a drive, or fixed (joint_type of a closure file)";
+    std::vector<std::string> loose;
+    for (const Drive& drive : mechanism_.drives) {
+      if (EndsLoose(drive)) loose.push_back(drive.name);
+    }
+    if (!loose.empty()) {
+      hint = Joined(loose, kNamed) + (loose.size() == 1 ? " moves" : " move") +
+             " no loop and no chosen joint: is a loop closure missing in the robot's file? Else " +
+             hint;
+    }
+    return Error(fmt::format("no drive holds {}, which {} the chosen joints",
+                             Joined(passive, kNamed), passive.size() == 1 ? "moves" : "move"),
+                 hint);
+  }
+
+  // Beyond its joint there is neither a loop nor a chosen joint.
+  [[nodiscard]] bool EndsLoose(const Drive& drive) const {
+    const auto* on = std::get_if<JointDrive>(&drive.kind);
+    if (on == nullptr) return false;
+    const std::vector<int> beyond = BodiesBeyond(mechanism_, on->joint);
+    const auto is_beyond = [&](int body) { return std::ranges::count(beyond, body) > 0; };
+    for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
+      const Joint& joint = mechanism_.joints[j];
+      const bool inside = is_beyond(joint.parent), also = is_beyond(joint.child);
+      if (!inside && !also) continue;
+      if (joint.closure || (inside != also && static_cast<int>(j) != on->joint)) return false;
+      for (const NamedCoordinate& chosen : found_.joints) {
+        if (chosen.coordinate.index == static_cast<int>(j)) return false;
+      }
+    }
+    return true;
+  }
+
+  // Of drives too many, those stay at home that also move joints between the world and the chosen
+  // ones: the knee above an ankle whose rods pass it.
+  bool HoldDrivesAbove(const std::vector<NamedCoordinate>& chosen,
+                       const std::set<Eigen::Index>& movers, const MatX& T,
+                       const BodyStates& states) {
+    std::set<Eigen::Index> above;
+    std::vector<std::string> joints;
+    for (size_t b = 1; b < found_.kept.size(); ++b) {
+      const int j = found_.kept[b] ? found_.toward_world[b] : -1;
+      if (j < 0 || IsChosen(j)) continue;
+      const Joint& joint = mechanism_.joints[static_cast<size_t>(j)];
+      for (int c = 0; c < DofsOf(joint.kind); ++c) {
+        const VecX rates = RatesOf(JointCoordinateRow(joint, c, states), T);
+        const size_t before = above.size();
+        for (const Eigen::Index k : movers) {
+          if (std::abs(rates[k]) > kMoves * rates.cwiseAbs().maxCoeff()) above.insert(k);
+        }
+        if (above.size() > before) joints.push_back(joint.name);
+      }
+    }
+    if (movers.size() - above.size() != found_.joints.size()) return false;
+    std::vector<NamedCoordinate> candidates = Fixed();
+    std::vector<std::string> held;
+    std::vector<int> drives;
+    for (const Eigen::Index k : movers) {
+      const NamedCoordinate& mover = chosen[static_cast<size_t>(k)];
+      if (!above.contains(k)) {
+        drives.push_back(mover.coordinate.index);
+        continue;
+      }
+      held.push_back(mover.name);
+      candidates.push_back(mover);
+    }
+    Append(found_.joints, &candidates);
+    if (!Choose(candidates, candidates.size()).dependent.empty()) return false;
+    found_.drives = std::move(drives);
+    found_.notes.push_back(
+        fmt::format("{} {} the chosen joints, too, and {} at home: choose {} as "
+                    "well to have both move",
+                    Joined(held), held.size() == 1 ? "moves" : "move",
+                    held.size() == 1 ? "stays" : "stay", Joined(joints)));
+    return true;
+  }
+
+  [[nodiscard]] bool IsChosen(int joint) const {
+    return std::ranges::any_of(found_.joints, [&](const NamedCoordinate& chosen) {
+      return chosen.coordinate.index == joint;
+    });
   }
 
   // A drive that is no coordinate and moves with those that are.
@@ -286,43 +378,51 @@ class TransmissionFinder {
   }
 
   // A serial model keeps the bodies on the way from the world to the chosen joints, by the fewest
-  // joints that are not chosen themselves. What else is tied to two of them with a chosen joint
-  // between closes a loop over it.
-  void FindLoopBodies() {
+  // joints that are not chosen themselves.
+  void FindWay() {
     const std::vector<std::array<int, 2>> edges = Edges();
     const size_t bodies = mechanism_.bodies.size();
-    std::set<int> chosen;
-    for (const NamedCoordinate& joint : found_.joints) chosen.insert(joint.coordinate.index);
     constexpr int kFar = 1 << 30;
-    std::vector<int> distance(bodies, kFar), before(bodies, -1), by(bodies, -1);
+    std::vector<int> distance(bodies, kFar);
+    before_.assign(bodies, -1);
+    found_.toward_world.assign(bodies, -1);
     distance[0] = 0;
     for (bool better = true; better;) {
       better = false;
       for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
-        const int cost = chosen.contains(static_cast<int>(j)) ? 0 : 1;
+        const int cost = IsChosen(static_cast<int>(j)) ? 0 : 1;
         for (const auto& [from, to] :
              {std::pair(edges[j][0], edges[j][1]), std::pair(edges[j][1], edges[j][0])}) {
           const auto f = static_cast<size_t>(from), t = static_cast<size_t>(to);
           if (distance[f] == kFar || distance[f] + cost >= distance[t]) continue;
           distance[t] = distance[f] + cost;
-          before[t] = from;
-          by[t] = static_cast<int>(j);
+          before_[t] = from;
+          found_.toward_world[t] = static_cast<int>(j);
           better = true;
         }
       }
     }
-    std::vector<bool> kept(bodies, false);
-    kept[0] = true;
-    for (const int j : chosen) {
-      const Joint& joint = mechanism_.joints[static_cast<size_t>(j)];
+    found_.kept.assign(bodies, false);
+    found_.kept[0] = true;
+    for (const NamedCoordinate& chosen : found_.joints) {
+      const Joint& joint = JointOf(chosen.coordinate);
       for (int b : {joint.parent, joint.child}) {
-        for (; b > 0; b = before[static_cast<size_t>(b)]) kept[static_cast<size_t>(b)] = true;
+        for (; b > 0; b = before_[static_cast<size_t>(b)])
+          found_.kept[static_cast<size_t>(b)] = true;
       }
     }
+  }
+
+  // What is tied to two of the kept bodies with a chosen joint between closes a loop over it.
+  void FindLoopBodies() {
+    const std::vector<std::array<int, 2>> edges = Edges();
+    const std::vector<bool>& kept = found_.kept;
+    const size_t bodies = mechanism_.bodies.size();
     const auto chosen_before = [&](int b) {
       std::set<int> on_way;
-      for (; b > 0; b = before[static_cast<size_t>(b)]) {
-        if (chosen.contains(by[static_cast<size_t>(b)])) on_way.insert(by[static_cast<size_t>(b)]);
+      for (; b > 0; b = before_[static_cast<size_t>(b)]) {
+        const int by = found_.toward_world[static_cast<size_t>(b)];
+        if (IsChosen(by)) on_way.insert(by);
       }
       return on_way;
     };
@@ -423,8 +523,53 @@ class TransmissionFinder {
   const std::vector<std::string>& names_;
   Diagnostics& diagnostics_;
   std::vector<NamedCoordinate> all_;
+  std::vector<int> before_;  // per body: the one towards the world
   Transmission found_;
 };
+
+// Joints that move with the chosen ones: those of their loops, of the drives', and what couplings
+// and held lengths tie to these.
+std::vector<bool> MovingJoints(const Mechanism& mechanism, const Transmission& transmission) {
+  std::vector<std::vector<int>> ties;
+  for (const LoopGroup& group : LoopGroups(mechanism)) {
+    ties.push_back(group.joints);
+    ties.back().insert(ties.back().end(), group.closures.begin(), group.closures.end());
+  }
+  for (const Coupling& coupling : mechanism.couplings) {
+    ties.emplace_back();
+    for (const Coupling::Term& term : coupling.terms) ties.back().push_back(term.joint);
+  }
+  for (const Drive& drive : mechanism.drives) {
+    const auto* leg = std::get_if<DistanceDrive>(&drive.kind);
+    if (leg == nullptr) continue;
+    std::set<int> around;  // tree joints between its two bodies
+    for (size_t t = mechanism.tree_joints.size(); t-- > 0;) {
+      const std::vector<int> beyond = BodiesBeyond(mechanism, mechanism.tree_joints[t]);
+      const auto is_beyond = [&](int body) { return std::ranges::count(beyond, body) > 0; };
+      if (is_beyond(leg->body_from) != is_beyond(leg->body_to))
+        around.insert(mechanism.tree_joints[t]);
+    }
+    ties.emplace_back(around.begin(), around.end());
+  }
+  std::vector<bool> moving(mechanism.joints.size(), false);
+  for (const NamedCoordinate& joint : transmission.joints) {
+    moving[static_cast<size_t>(joint.coordinate.index)] = true;
+  }
+  for (const int d : transmission.drives) {
+    const auto* on = std::get_if<JointDrive>(&mechanism.drives[static_cast<size_t>(d)].kind);
+    if (on != nullptr) moving[static_cast<size_t>(on->joint)] = true;
+  }
+  for (bool more = true; more;) {
+    more = false;
+    for (const std::vector<int>& tie : ties) {
+      const auto moves = [&](int j) { return bool{moving[static_cast<size_t>(j)]}; };
+      if (std::ranges::none_of(tie, moves) || std::ranges::all_of(tie, moves)) continue;
+      for (const int j : tie) moving[static_cast<size_t>(j)] = true;
+      more = true;
+    }
+  }
+  return moving;
+}
 
 }  // namespace
 
@@ -440,6 +585,94 @@ std::optional<Transmission> FindTransmission(const Mechanism& mechanism,
                                              const std::vector<std::string>& names,
                                              Diagnostics* diagnostics) {
   return TransmissionFinder(mechanism, names, diagnostics).Find();
+}
+
+Mechanism MovingPart(const Mechanism& mechanism, const Transmission& transmission) {
+  const std::vector<bool> moving = MovingJoints(mechanism, transmission);
+  std::vector<int> body_at(mechanism.bodies.size(), -1);  // new index
+  Mechanism part = mechanism;
+  part.outputs.clear();
+  part.contacts.clear();
+  part.beams.clear();
+  part.bodies.resize(1);
+  part.X_WB_home.resize(1);
+  body_at[0] = 0;
+  for (size_t t = 0; t < mechanism.tree_joints.size(); ++t) {
+    const auto outboard = static_cast<size_t>(OutboardBody(mechanism, t));
+    const bool still = body_at[static_cast<size_t>(InboardBody(mechanism, t))] == 0 &&
+                       !moving[static_cast<size_t>(mechanism.tree_joints[t])];
+    body_at[outboard] = still ? 0 : static_cast<int>(part.bodies.size());
+    if (still) continue;
+    part.bodies.push_back(mechanism.bodies[outboard]);
+    part.X_WB_home.push_back(mechanism.X_WB_home[outboard]);
+  }
+  // Of a place on a body; on one that is still, it is in the world.
+  const auto move = [&](int* body, const auto& shift) {
+    const auto old = static_cast<size_t>(*body);
+    *body = body_at[old];
+    if (*body == 0) shift(mechanism.X_WB_home[old]);
+  };
+  const auto move_pose = [&](int* body, Pose* X_BF) {
+    move(body, [&](const Pose& X_WB) { *X_BF = X_WB * *X_BF; });
+  };
+  const auto move_point = [&](int* body, Vec3* p_B) {
+    move(body, [&](const Pose& X_WB) { *p_B = X_WB * *p_B; });
+  };
+  // Keeps what `change` returns true for, and says where it went.
+  const auto keep = [](auto* list, const auto& change) {
+    std::vector<int> at(list->size(), -1);
+    size_t kept = 0;
+    for (size_t k = 0; k < list->size(); ++k) {
+      if (!change(&(*list)[k])) continue;
+      at[k] = static_cast<int>(kept);
+      if (kept != k) (*list)[kept] = std::move((*list)[k]);
+      ++kept;
+    }
+    list->resize(kept);
+    return at;
+  };
+  const auto follow = [](const std::vector<int>& at, int* index) {
+    if (*index >= 0) *index = at[static_cast<size_t>(*index)];
+    return *index >= 0;
+  };
+  const std::vector<int> joint_at = keep(&part.joints, [&](Joint* joint) {
+    move_pose(&joint->parent, &joint->X_PF);
+    move_pose(&joint->child, &joint->X_CM);
+    return joint->parent != joint->child;
+  });
+  const std::vector<int> drive_at = keep(&part.drives, [&](Drive* drive) {
+    if (auto* on = std::get_if<JointDrive>(&drive->kind)) return follow(joint_at, &on->joint);
+    auto& leg = std::get<DistanceDrive>(drive->kind);
+    move_point(&leg.body_from, &leg.p_from);
+    move_point(&leg.body_to, &leg.p_to);
+    return leg.body_from != leg.body_to;
+  });
+  const std::vector<int> bushing_at = keep(&part.bushings, [&](Bushing* bushing) {
+    move_pose(&bushing->parent, &bushing->X_PF);
+    move_pose(&bushing->child, &bushing->X_CM);
+    return bushing->parent != bushing->child;
+  });
+  keep(&part.prescribed, [&](Prescribed* one) { return follow(joint_at, &one->joint); });
+  keep(&part.motors, [&](Motor* motor) { return follow(drive_at, &motor->drive); });
+  keep(&part.springs, [&](SpringDamper* spring) {
+    move_point(&spring->body_from, &spring->p_from);
+    move_point(&spring->body_to, &spring->p_to);
+    return spring->body_from != spring->body_to;
+  });
+  keep(&part.couplings, [&](Coupling* coupling) {
+    return std::ranges::all_of(coupling->terms,
+                               [&](Coupling::Term& term) { return follow(joint_at, &term.joint); });
+  });
+  keep(&part.elements, [&](ForceElement* element) {
+    if (auto* rotor = std::get_if<RotorLaw>(&element->law); rotor != nullptr && rotor->carrier) {
+      move(&rotor->carrier->body, [&](const Pose& X_WB) {
+        rotor->carrier->axis_B = X_WB.linear() * rotor->carrier->axis_B;
+      });
+    }
+    return follow(joint_at, &element->joint) || follow(drive_at, &element->drive) ||
+           follow(bushing_at, &element->bushing);
+  });
+  return BuildSpanningTree(&part).ok() ? part : mechanism;
 }
 
 }  // namespace mbv

@@ -18,6 +18,8 @@ struct Transmission {
   std::vector<CoordinateRange> ranges;  ///< per drive: its own, and that of its joint
   std::vector<NamedCoordinate> held;    ///< the other degrees of freedom, which stay at home
   std::vector<int> loop_bodies;         ///< that a serial model does not have: cranks and rods
+  std::vector<int> toward_world;        ///< per body: joint on its way to the world, -1: none
+  std::vector<bool> kept;               ///< per body: a serial model has it, or it is the world
   std::vector<std::string> notes;       ///< what is left out or taken otherwise
 
   /// The robot, rotors of its motors included as elements (RotorLaw) on their drives.
@@ -33,9 +35,15 @@ struct Transmission {
 };
 
 /// Coordinates of joints called `names`; nothing after an error: unknown, chosen twice, dependent
-/// on each other, or not as many as the drives that move them.
+/// on each other, or not as many as the drives that move them. Drives too many that also move
+/// joints on the way from the world to the chosen ones (a knee above an ankle) are held.
 [[nodiscard]] std::optional<Transmission> FindTransmission(const Mechanism& mechanism,
                                                            const std::vector<std::string>& names,
                                                            Diagnostics* diagnostics);
+
+/// The same robot with all that stays still, while the chosen joints move and the other degrees of
+/// freedom are held, as part of the world: other legs, and the leg above an ankle. Maps, inertias
+/// and forces along the joints are the same. Without outputs, contacts and beams.
+[[nodiscard]] Mechanism MovingPart(const Mechanism& mechanism, const Transmission& transmission);
 
 }  // namespace mbv
