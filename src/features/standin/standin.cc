@@ -208,6 +208,7 @@ class StandinComputer {
     result_.notes = transmission_.notes;
     mechanism_ = MovingPart(robot_, transmission_);
     if (Diagnostics unseen; auto moving = FindTransmission(mechanism_, joints, &unseen)) {
+      moving->held = InPart(transmission_.held, std::move(moving->held));
       transmission_ = *std::move(moving);
     } else {
       mechanism_ = robot_;
@@ -234,6 +235,20 @@ class StandinComputer {
  private:
   void Error(std::string message, std::string hint) {
     result_.diagnostics.AddError(robot_.file, std::move(message), std::move(hint));
+  }
+
+  // Where a rod's spin can be held by one coordinate or another: by the same one in the part.
+  [[nodiscard]] std::vector<NamedCoordinate> InPart(const std::vector<NamedCoordinate>& held,
+                                                    std::vector<NamedCoordinate> otherwise) const {
+    std::vector<NamedCoordinate> there;
+    for (NamedCoordinate named : held) {
+      int& index = named.coordinate.index;
+      index = named.coordinate.kind == Coordinate::Kind::kDrive
+                  ? mechanism_.FindDrive(named.name)
+                  : mechanism_.FindJoint(robot_.joints[static_cast<size_t>(index)].name);
+      if (index >= 0) there.push_back(std::move(named));
+    }
+    return there.size() == otherwise.size() ? there : otherwise;
   }
 
   void Describe() {
