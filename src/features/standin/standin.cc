@@ -20,7 +20,8 @@ namespace {
 
 constexpr double kHalfRange = std::numbers::pi / 6.0;  // where neither user nor joint states one
 constexpr double kMostPoses = 200000.0;
-constexpr int kSamples = 400;  // of a period
+constexpr int kSamples = 400;    // of a period
+constexpr size_t kCounted = 11;  // poses along a joint whose drives' joint poses are counted
 // Singular values below this share of the largest, there or at home, are round-off.
 constexpr double kRegular = 1e-9;
 constexpr double kMost = std::numeric_limits<double>::max();
@@ -83,11 +84,12 @@ class Parts {
   [[nodiscard]] VecX home() const { return home_.head(n_); }
 
   // From the pose before, else from home. `q` … of the chosen joints; the others rest at home.
-  RunSummary Move(const VecX& q, const VecX& v, const VecX& a) {
-    RunSummary summary = MoveAll(q, v, a);
+  // `all`: else J and drives alone are known afterwards.
+  RunSummary Move(const VecX& q, const VecX& v, const VecX& a, bool all = true) {
+    RunSummary summary = MoveParts(q, v, a, all);
     if (!summary.ok() && !at_home_) {
       Restart();
-      summary = MoveAll(q, v, a);
+      summary = MoveParts(q, v, a, all);
     }
     at_home_ = !summary.ok();
     if (!summary.ok()) Restart();
@@ -138,12 +140,13 @@ class Parts {
     at_home_ = true;
   }
 
-  RunSummary MoveAll(const VecX& q, const VecX& v, const VecX& a) {
+  RunSummary MoveParts(const VecX& q, const VecX& v, const VecX& a, bool all) {
     VecX at = home_, rates = VecX::Zero(home_.size()), accelerations = rates;
     at.head(n_) = q;
     rates.head(n_) = v;
     accelerations.head(n_) = a;
     for (Part* part : {&full_part_, &without_rotors_part_, &serial_part_, &loop_part_}) {
+      if (part != &full_part_ && !all) break;
       if (RunSummary summary = part->Move(at, rates, accelerations); !summary.ok()) return summary;
     }
     MatX T;
@@ -215,17 +218,23 @@ class StandinComputer {
     }
     n_ = static_cast<Eigen::Index>(joints.size());
     parts_.emplace(transmission_);
+    branches_.emplace(mechanism_, transmission_);
     Describe();
     ReadRanges();
     if (result_.diagnostics.has_errors() || !AtHome()) return std::move(result_);
     MakeGrid();
-    WalkGrid([this](StandinPose* pose) { Look(pose); }, 0.0, 0.4);
+    do {
+      doubted_ = false;
+      WalkGrid([this](StandinPose* pose) { Look(pose); }, 0.0, 0.4);
+    } while (doubted_);
     if (result_.usable() == 0) {
       Error("no pose of the range can be used: " + FirstTrouble(), "another --range");
       return std::move(result_);
     }
     FitArmature();
     FindWorst();
+    FindBranches();
+    FindEnds();
     std::mt19937_64 random(settings_.seed);
     WalkGrid([&](StandinPose* pose) { Load(pose, &random); }, 0.4, 0.9);
     AddScenes();
@@ -340,6 +349,7 @@ class StandinComputer {
       return false;
     }
     result_.J_home = parts_->J();
+    result_.drives_home = parts_->drives();
     const Eigen::JacobiSVD<MatX> svd(scale_.Scaled(result_.J_home));
     const VecX& values = svd.singularValues();
     if (!(values[n_ - 1] > kRegular * values[0])) {
@@ -347,6 +357,7 @@ class StandinComputer {
             "another home pose (guesses of the model)");
       return false;
     }
+    for (Eigen::Index k = 0; k < n_; ++k) CheckLimb(k, result_.home, result_.drives_home[k]);
     result_.least_home = values[n_ - 1];
     result_.largest_home = values[0];
     sign_ = result_.J_home.determinant() > 0.0;
@@ -396,7 +407,31 @@ class StandinComputer {
     return "";
   }
 
+  // What the reference finds decides whether a limb is what it was taken for.
+  void CheckLimb(Eigen::Index k, const VecX& q, double drive) {
+    if (branches_->Fits(k, q, drive)) return;
+    branches_->Doubt(k);
+    doubted_ = true;
+  }
+
+  // The first drive whose limb cannot be put together, or "".
+  [[nodiscard]] std::string OutOfReach(const VecX& q) const {
+    double apart = kNan;
+    for (Eigen::Index k = 0; k < n_; ++k) {
+      if (!branches_->KindOf(k).empty() && branches_->Ways(k, q, &apart).empty()) {
+        return result_.drives[At(k)];
+      }
+    }
+    return "";
+  }
+
   void Look(StandinPose* pose) {
+    pose->status = PoseStatus::kOpen;
+    if (const std::string drive = OutOfReach(pose->q); !drive.empty()) {
+      pose->where = "limb of " + drive;
+      if (trouble_.empty()) trouble_ = pose->where + " is out of reach";
+      return;
+    }
     const VecX still = VecX::Zero(n_);
     if (const RunSummary summary = parts_->Move(pose->q, still, still); !summary.ok()) {
       pose->where = summary.where.empty() ? ToText(summary.stop) : summary.where;
@@ -404,6 +439,7 @@ class StandinComputer {
       return;
     }
     pose->drives = parts_->drives();
+    for (Eigen::Index k = 0; k < n_; ++k) CheckLimb(k, pose->q, pose->drives[k]);
     pose->J = parts_->J();
     const Eigen::JacobiSVD<MatX> svd(scale_.Scaled(pose->J));
     pose->least = svd.singularValues()[n_ - 1];
@@ -454,6 +490,116 @@ class StandinComputer {
     };
     limit(result_.drive_forces, back, &pose->torque_alone, &pose->torque_any);
     limit(result_.drive_speeds, pose->J, &pose->speed_alone, &pose->speed_any);
+  }
+
+  // Both ways of every limb, and the poses of the joints at some of the drives' positions.
+  void FindBranches() {
+    result_.limbs.resize(At(n_));
+    std::vector<size_t> home_way(At(n_));
+    double apart = kNan;
+    // Index of the way that a drive is on.
+    const auto way_of = [](const std::vector<double>& ways, double drive) {
+      const auto off = [&](double way) {
+        return std::abs(std::remainder(way - drive, 2.0 * std::numbers::pi));
+      };
+      return ways.size() > 1 && off(ways[1]) < off(ways[0]) ? size_t{1} : size_t{0};
+    };
+    for (Eigen::Index k = 0; k < n_; ++k) {
+      StandinLimb& limb = result_.limbs[At(k)];
+      limb.kind = branches_->KindOf(k);
+      if (limb.kind.empty()) continue;
+      const std::vector<double> ways = branches_->Ways(k, result_.home, &apart);
+      home_way[At(k)] = way_of(ways, result_.drives_home[k]);
+      if (ways.size() > 1) limb.other_home = ways[1 - home_way[At(k)]];
+    }
+    const auto row = static_cast<size_t>(result_.resolution);
+    const size_t stride = (row + kCounted - 1) / kCounted;
+    for (size_t i = 0; i < result_.poses.size(); ++i) {
+      StandinPose& pose = result_.poses[i];
+      if (pose.status != PoseStatus::kUsable) continue;
+      pose.ways = 1;
+      for (Eigen::Index k = 0; k < n_; ++k) {
+        StandinLimb& limb = result_.limbs[At(k)];
+        if (limb.kind.empty()) {
+          pose.ways = -1;
+          continue;
+        }
+        const std::vector<double> ways = branches_->Ways(k, pose.q, &apart);
+        if (pose.ways > 0) pose.ways *= static_cast<int>(ways.size());
+        if (way_of(ways, pose.drives[k]) != home_way[At(k)]) ++limb.other_way;
+        if (std::isnan(apart) || apart >= limb.apart) continue;
+        limb.apart = apart;
+        limb.apart_at = i;
+      }
+      if (i % row % stride != 0 || i / row % stride != 0) continue;
+      if (const auto poses = branches_->Poses(pose.drives)) {
+        pose.joint_poses = static_cast<int>(poses->size());
+      }
+    }
+    if (auto poses = branches_->Poses(result_.drives_home)) {
+      result_.poses_at_home = *std::move(poses);
+      std::ranges::sort(result_.poses_at_home, {},
+                        [&](const VecX& q) { return (q - result_.home).squaredNorm(); });
+    }
+  }
+
+  void FindEnds() {
+    for (Eigen::Index joint = 0; joint < n_; ++joint) {
+      for (const bool up : {false, true}) result_.ends.push_back(EndOf(joint, up));
+    }
+  }
+
+  StandinEnd EndOf(Eigen::Index joint, bool up) {
+    using Kind = StandinEnd::Kind;
+    StandinEnd end{.joint = At(joint), .up = up};
+    const StandinRange& range = result_.ranges[At(joint)];
+    const double home = result_.home[joint];
+    const double most = result_.joint_units[At(joint)] == "rad" ? std::numbers::pi
+                        : up                                    ? range.high - home
+                                                                : home - range.low;
+    VecX q = result_.home;
+    const VecX still = VecX::Zero(n_);
+    const auto look = [&](double by) {
+      q[joint] = home + (up ? by : -by);
+      end.where = OutOfReach(q);
+      if (!end.where.empty()) return Kind::kDeadCentre;
+      if (const RunSummary moved = parts_->Move(q, still, still, false); !moved.ok()) {
+        end.where = moved.where;
+        return Kind::kOpen;
+      }
+      end.where = BeyondRange(parts_->drives());
+      if (!end.where.empty()) return Kind::kDriveRange;
+      return (parts_->J().determinant() > 0.0) == sign_ ? Kind::kNone : Kind::kType2;
+    };
+    (void)look(0.0);
+    constexpr int kSteps = 180;
+    double good = 0.0;
+    for (int i = 1; i <= kSteps && end.kind == Kind::kNone; ++i) {
+      double bad = most * i / kSteps;
+      Kind kind = look(bad);
+      for (int k = 0; k < 24 && kind != Kind::kNone; ++k) {
+        const double middle = 0.5 * (good + bad);
+        const std::string where = end.where;
+        if (const Kind there = look(middle); there == Kind::kNone) {
+          good = middle;
+          end.where = where;
+        } else {
+          bad = middle;
+          kind = there;
+        }
+      }
+      if (kind == Kind::kNone) good = bad;
+      end.kind = kind;
+    }
+    end.at = home + (up ? good : -good);
+    // The reference stops short of a dead centre.
+    constexpr double kShort = 1e-3;
+    q[joint] = home + (up ? 1.0 : -1.0) * (good + kShort * most);
+    if (const std::string drive = OutOfReach(q); end.kind == Kind::kOpen && !drive.empty()) {
+      end.kind = Kind::kDeadCentre;
+      end.where = drive;
+    }
+    return end;
   }
 
   [[nodiscard]] std::string FirstTrouble() const {
@@ -549,7 +695,8 @@ class StandinComputer {
       moving.emplace_back(pose.q, &pose.moving);
     }
     AddScene("at rest", "gravity and springs at all usable poses", rest);
-    AddMotion();
+    AddMotion(Swing());
+    for (const StandinMotion& motion : settings_.motions) AddMotion(motion);
     if (!no_balance_.empty()) {
       result_.notes.push_back("torques follow from the forces along the joints alone: " +
                               no_balance_);
@@ -562,9 +709,15 @@ class StandinComputer {
   }
 
   // q_k = centre + A sin(2π f t + k π/2).
-  void AddMotion() {
-    std::vector<StandinState> states(kSamples);
-    std::vector<std::pair<VecX, const StandinState*>> scene;
+  [[nodiscard]] StandinMotion Swing() const {
+    StandinMotion motion{
+        .name = "in motion",
+        .text = fmt::format("all joints swing at {:.4g} Hz by {:.0f} % of their ranges' halves "
+                            "about the middle, each a quarter period ahead of the one before, {} "
+                            "samples of a period",
+                            settings_.frequency_hz, 100.0 * settings_.amplitude, kSamples),
+        .q = {},
+        .v = {}};
     const VecX amplitude = Amplitude(0);
     const double omega = 2.0 * std::numbers::pi * settings_.frequency_hz;
     for (int i = 0; i < kSamples; ++i) {
@@ -578,19 +731,25 @@ class StandinComputer {
         v[k] = amplitude[k] * omega * std::cos(phase);
         a[k] = -omega * omega * swing;
       }
-      StandinState& state = states[static_cast<size_t>(i)];
-      if (parts_->Move(q, v, a).ok() && (parts_->J().determinant() > 0.0) == sign_ &&
-          BeyondRange(parts_->drives()).empty()) {
-        Evaluate(&state);
-      }
-      scene.emplace_back(q, &state);
+      motion.q.push_back(std::move(q));
+      motion.v.push_back(std::move(v));
+      motion.a.push_back(std::move(a));
     }
-    AddScene("in motion",
-             fmt::format("all joints swing at {:.4g} Hz by {:.0f} % of their ranges' halves about "
-                         "the middle, each a quarter period ahead of the one before, {} samples of "
-                         "a period",
-                         settings_.frequency_hz, 100.0 * settings_.amplitude, kSamples),
-             scene);
+    return motion;
+  }
+
+  void AddMotion(const StandinMotion& motion) {
+    std::vector<StandinState> states(motion.q.size());
+    std::vector<std::pair<VecX, const StandinState*>> scene;
+    for (size_t i = 0; i < states.size(); ++i) {
+      if (OutOfReach(motion.q[i]).empty() &&
+          parts_->Move(motion.q[i], motion.v[i], motion.a[i]).ok() &&
+          (parts_->J().determinant() > 0.0) == sign_ && BeyondRange(parts_->drives()).empty()) {
+        Evaluate(&states[i]);
+      }
+      scene.emplace_back(motion.q[i], &states[i]);
+    }
+    AddScene(motion.name, motion.text, scene);
   }
 
   void AddScene(std::string name, std::string text,
@@ -626,10 +785,11 @@ class StandinComputer {
   const std::function<void(double)>& progress_;
   Transmission transmission_;
   std::optional<Parts> parts_;
+  std::optional<StandinBranches> branches_;
   StandinResult result_;
   Eigen::Index n_ = 0;
   UnitScale scale_;
-  bool joints_differ_ = false, sign_ = true;
+  bool joints_differ_ = false, sign_ = true, doubted_ = false;
   std::string no_balance_;  ///< of the first state without all forces
   std::string trouble_;     ///< of the first pose that cannot be closed
 };
@@ -646,6 +806,22 @@ const char* WordOf(PoseStatus status) {
       return "beyond a drive's range";
     case PoseStatus::kBeyond:
       return "beyond a singularity";
+  }
+  return "";
+}
+
+const char* WordOf(StandinEnd::Kind kind) {
+  switch (kind) {
+    case StandinEnd::Kind::kNone:
+      return "no end";
+    case StandinEnd::Kind::kDriveRange:
+      return "end of a drive's range";
+    case StandinEnd::Kind::kDeadCentre:
+      return "type 1, dead centre";
+    case StandinEnd::Kind::kOpen:
+      return "not closed beyond";
+    case StandinEnd::Kind::kType2:
+      return "type 2";
   }
   return "";
 }

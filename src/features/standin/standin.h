@@ -21,6 +21,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,12 +36,19 @@ struct StandinRange {
   double low = kNan, high = kNan;
 };
 
+/// A motion of the chosen joints to compare along.
+struct StandinMotion {
+  std::string name, text;          ///< of the scene
+  std::vector<VecX> q, v, a = {};  ///< per sample, in the joints' order [rad or m, per s, s²]
+};
+
 struct StandinSettings {
   std::vector<StandinRange> ranges;  ///< others: the joint's limits, else home ± 30°
   int resolution = 0;                ///< poses along each joint; 0: by the number of joints
   double amplitude = 0.5;            ///< of the motion, by half the range
   double frequency_hz = 1.0;
   std::uint64_t seed = 1;
+  std::vector<StandinMotion> motions = {};  ///< further scenes
 };
 
 enum class PoseStatus {
@@ -79,7 +88,31 @@ struct StandinPose {
       speed_alone;  ///< per joint, the others without torque or speed; NaN: no limits
   double torque_any = kNan, speed_any = kNan;  ///< in every direction; NaN: units differ
   StandinState rest, moving;                   ///< at rest; with a velocity and acceleration drawn
+  /// Positions of the drives that put the limbs together, all drives together; -1: not known.
+  int ways = -1;
+  int joint_poses =
+      -1;  ///< poses of the joints over a turn that have these drives; -1: not counted
 };
+
+/// What puts a chosen joint's drive and the joints together.
+struct StandinLimb {
+  std::string kind;          ///< of StandinBranches::KindOf()
+  double other_home = kNan;  ///< the drive's other position at home; NaN: there is none
+  double apart = kNan;       ///< least distance of both ways at usable poses [rad or m]
+  size_t apart_at = 0;       ///< its index in `poses`
+  size_t other_way = 0;      ///< usable poses where the drive is on the way that it is not at home
+};
+
+/// How far a joint moves from home while the others stay there: to the first end.
+struct StandinEnd {
+  enum class Kind { kNone, kDriveRange, kDeadCentre, kOpen, kType2 };
+  size_t joint = 0;
+  bool up = false;
+  double at = kNan;  ///< [rad or m]
+  Kind kind = Kind::kNone;
+  std::string where = {};  ///< drive or joint
+};
+[[nodiscard]] const char* WordOf(StandinEnd::Kind kind);
 
 /// Median, 95th percentile (nearest rank) and worst of magnitudes.
 struct Spread {
@@ -106,7 +139,7 @@ struct StandinResult {
   std::vector<std::string> range_of;  ///< per joint: where the range is from
   int resolution = 0;
   double amplitude = 0.0, frequency_hz = 0.0;
-  VecX home;
+  VecX home, drives_home;
   MatX J_home;
   std::string unit;                               ///< of the singular values
   double least_home = kNan, largest_home = kNan;  ///< singular values of J_home, scaled
@@ -120,10 +153,41 @@ struct StandinResult {
   VecX drive_forces, drive_speeds;  ///< limits by the motors, per drive; infinite: none
   bool torque_limits = false, speed_limits = false;  ///< of all drives
   std::vector<StandinScene> scenes;
+  std::vector<StandinLimb> limbs;  ///< per drive
+  std::vector<StandinEnd> ends;    ///< per joint: down, up
+  /// Poses of the joints over a turn with the drives at home, that of home first; empty: not known.
+  std::vector<VecX> poses_at_home;
   Diagnostics diagnostics;  ///< errors: nothing was computed
 
   [[nodiscard]] size_t CountOf(PoseStatus status) const;
   [[nodiscard]] size_t usable() const { return CountOf(PoseStatus::kUsable); }
+};
+
+/// The ways to put limbs together, in closed form: a crank, slider or cylinder on a drive, and one
+/// rod (branches.cc, eq. 1). Limbs of other kinds are unknown.
+class StandinBranches {
+ public:
+  /// Both outlive the object.
+  StandinBranches(const Mechanism& mechanism, const Transmission& transmission);
+  ~StandinBranches();
+
+  /// "crank and rod", "slider and rod", "cylinder", "leg", "the joint itself"; "": unknown.
+  [[nodiscard]] std::string KindOf(Eigen::Index drive) const;
+  /// The limb of a drive counts as unknown from here on.
+  void Doubt(Eigen::Index drive);
+  /// (1) holds; true of unknown ones.
+  [[nodiscard]] bool Fits(Eigen::Index drive, const VecX& q, double m) const;
+  /// All positions of a drive at a pose of the joints: two, one or none. `apart`: of two of them.
+  /// Of a known limb.
+  [[nodiscard]] std::vector<double> Ways(Eigen::Index drive, const VecX& q, double* apart) const;
+  /// All poses of the joints over a turn for positions of the drives; nothing with more than two
+  /// joints, joints that slide, or unknown limbs. Two zeros nearer than a degree may be missed.
+  [[nodiscard]] std::optional<std::vector<VecX>> Poses(const VecX& drives) const;
+
+ private:
+  struct Limb;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 /// `progress` gets the share that is done.

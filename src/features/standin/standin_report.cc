@@ -90,6 +90,46 @@ double ShareOf(const StandinResult& result, size_t poses) {
   return static_cast<double>(poses) / static_cast<double>(result.poses.size());
 }
 
+// "-65.85° (type 1, dead centre: low)".
+std::string EndText(const StandinResult& result, const StandinEnd& end) {
+  const std::string& unit = result.joint_units[end.joint];
+  return fmt::format("{:.4g}{} ({}{})", InShownUnit(end.at, unit), ShownUnit(unit),
+                     WordOf(end.kind), end.where.empty() ? "" : ": " + end.where);
+}
+
+std::string EndsSentence(const StandinResult& result) {
+  std::vector<std::string> parts;
+  for (size_t k = 0; k + 1 < result.ends.size(); k += 2) {
+    parts.push_back(fmt::format("{} from {} to {}", result.joints[result.ends[k].joint],
+                                EndText(result, result.ends[k]),
+                                EndText(result, result.ends[k + 1])));
+  }
+  return "Alone, the others at home: " + Joined(parts, kMostNames);
+}
+
+// "4 at 1681 poses".
+template <typename Value>
+std::map<int, size_t> CountsOf(const StandinResult& result, const Value& value) {
+  std::map<int, size_t> counts;
+  for (const StandinPose& pose : result.poses) {
+    if (pose.status == PoseStatus::kUsable && value(pose) >= 0) ++counts[value(pose)];
+  }
+  return counts;
+}
+std::string CountsText(const std::map<int, size_t>& counts) {
+  std::vector<std::string> parts;
+  for (const auto& [count, poses] : counts) {
+    parts.push_back(fmt::format("{} at {} pose{}", count, poses, poses == 1 ? "" : "s"));
+  }
+  return parts.empty() ? "not known" : Joined(parts, kMostNames);
+}
+std::map<int, size_t> WaysOf(const StandinResult& result) {
+  return CountsOf(result, [](const StandinPose& pose) { return pose.ways; });
+}
+std::map<int, size_t> JointPosesOf(const StandinResult& result) {
+  return CountsOf(result, [](const StandinPose& pose) { return pose.joint_poses; });
+}
+
 std::string ReachSentence(const StandinResult& result) {
   std::string text =
       fmt::format("{} of the range can be used", Percent(ShareOf(result, result.usable())));
@@ -114,6 +154,14 @@ WorstDrive WorstDriveOf(const StandinScene& scene, size_t cause) {
   return worst;
 }
 
+size_t LargestCause(const StandinScene& scene) {
+  size_t cause = 0;
+  for (size_t c = 1; c < kCauses; ++c) {
+    if (WorstDriveOf(scene, c).share > WorstDriveOf(scene, cause).share) cause = c;
+  }
+  return cause;
+}
+
 const char* RemedyOf(size_t cause) {
   constexpr std::array<const char*, kCauses> kRemedies = {
       "map torques with J(q), as standin.csv has it, instead of constant ratios",
@@ -130,10 +178,7 @@ std::string ErrorSentence(const StandinResult& result, const StandinScene& scene
     return fmt::format("{}: the serial model's motor torques are right within {} of what is needed",
                        scene.name, Percent(whole.share));
   }
-  size_t cause = 0;
-  for (size_t c = 1; c < kCauses; ++c) {
-    if (WorstDriveOf(scene, c).share > WorstDriveOf(scene, cause).share) cause = c;
-  }
+  const size_t cause = LargestCause(scene);
   const Spread& error = scene.errors[whole.drive][kWhole];
   const double needed = scene.full_p95[whole.drive];
   return fmt::format(
@@ -222,6 +267,60 @@ Table SingularTable(const StandinResult& result) {
   table.rows.push_back({"type 1: smallest of J⁻¹ (0: dead centre)",
                         Short(1.0 / result.largest_home), Short(1.0 / type1.largest),
                         PlaceText(result, type1.q)});
+  return table;
+}
+
+Table EndTable(const StandinResult& result) {
+  Table table{.name = "standin_ends",
+              .caption = "Each joint alone from home, the others at home, limits of joints aside",
+              .columns = {Text("joint"), Text("towards"), Digits("ends at"), Text("unit"),
+                          Text("by"), Text("of")}};
+  for (const StandinEnd& end : result.ends) {
+    const std::string& unit = result.joint_units[end.joint];
+    table.rows.push_back({result.joints[end.joint], end.up ? "+" : "-",
+                          fmt::format("{:.6g}", InShownUnit(end.at, unit)), ShownUnit(unit),
+                          WordOf(end.kind), end.where});
+  }
+  return table;
+}
+
+Table LimbTable(const StandinResult& result) {
+  Table table{.name = "standin_limbs",
+              .caption = "Ways to put each limb together at a pose of the joints",
+              .columns = {Text("drive"), Text("limb"), Digits("ways"), Digits("at home"),
+                          Digits("the other way"), Digits("least apart"), Text("unit"),
+                          Wide("there"), Digits("poses on the other way")}};
+  for (size_t d = 0; d < result.limbs.size(); ++d) {
+    const StandinLimb& limb = result.limbs[d];
+    const std::string& unit = result.drive_units[d];
+    const bool two = std::isfinite(limb.apart);
+    table.rows.push_back({result.drives[d], limb.kind.empty() ? "of another kind" : limb.kind,
+                          limb.kind.empty() ? "–"
+                          : two             ? "2"
+                                            : "1",
+                          Short(InShownUnit(result.drives_home[Ix(d)], unit)),
+                          Short(InShownUnit(limb.other_home, unit)),
+                          Short(InShownUnit(limb.apart, unit)), ShownUnit(unit),
+                          two ? PlaceText(result, result.poses[limb.apart_at].q) : "",
+                          limb.kind.empty() ? "–" : std::to_string(limb.other_way)});
+  }
+  return table;
+}
+
+Table HomePosesTable(const StandinResult& result) {
+  Table table{.name = "standin_assemblies",
+              .caption = "Poses of the joints with the drives as at home, that of home first",
+              .columns = {}};
+  for (size_t k = 0; k < result.joints.size(); ++k) {
+    table.columns.push_back(
+        Digits(result.joints[k] + " [" + ShownUnit(result.joint_units[k]) + "]"));
+  }
+  for (const VecX& q : result.poses_at_home) {
+    table.rows.emplace_back();
+    for (size_t k = 0; k < result.joints.size(); ++k) {
+      table.rows.back().emplace_back(Short(InShownUnit(q[Ix(k)], result.joint_units[k])));
+    }
+  }
   return table;
 }
 
@@ -466,6 +565,21 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
   }
   sections.push_back(std::move(inertia));
 
+  ReportSection branches{.title = "Ends and assemblies", .link = "Assemblies"};
+  branches.Add(EndTable(result));
+  branches.Add(LimbTable(result));
+  Items counts;
+  counts.texts = {
+      "positions of the drives that put the limbs together: " + CountsText(WaysOf(result)),
+      "poses of the joints over a turn with the same drives: " + CountsText(JointPosesOf(result))};
+  branches.Add(std::move(counts));
+  if (!result.poses_at_home.empty()) branches.Add(HomePosesTable(result));
+  branches.Note(
+      "At a dead centre (type 1) both ways of a limb meet, and beyond it the rod does not reach. A "
+      "limb's ways follow from a rod's length in closed form, and hold where they give the drives "
+      "that the reference found at every pose.");
+  sections.push_back(std::move(branches));
+
   ReportSection singular{.title = "Singularities", .link = "Singularities"};
   singular.Add(SingularTable(result));
   AddMap(
@@ -557,23 +671,42 @@ Json SceneJson(const StandinResult& result, const StandinScene& scene) {
           {"drives", std::move(drives)}};
 }
 
+std::string MapSentence(const StandinResult& result) {
+  const Spread& map = result.map_error;
+  if (!(map.worst > kSmall)) {
+    return fmt::format(
+        "The neutral ratio is right within {} over the whole range: a constant gear does",
+        Percent(map.worst));
+  }
+  return fmt::format(
+      "With the neutral ratio motor torques are wrong by {} in the median, by more than {} in 5 % "
+      "of the range (worst {}, at {})",
+      Percent(map.median), Percent(map.p95), Percent(map.worst),
+      PlaceText(result, result.poses[map.at].q));
+}
+
 }  // namespace
+
+std::string VerdictOf(const StandinResult& result) {
+  // Along the motion that was asked for last; else of all states.
+  const StandinScene& scene =
+      result.scenes.size() > 3 ? result.scenes[result.scenes.size() - 2] : result.scenes.back();
+  std::string text = MapSentence(result);
+  const WorstDrive whole = WorstDriveOf(scene, kWhole);
+  if (scene.states > 0 && whole.share > kSmall) {
+    const size_t cause = LargestCause(scene);
+    text += fmt::format(
+        "; {}, with masses and rotors, {} is wrong by {} of what it needs in 5 % "
+        "of the states, mostly by {}: {}",
+        scene.name, result.drives[whole.drive], Percent(whole.share), kCauseNames.at(cause),
+        RemedyOf(cause));
+  }
+  return Sentence(std::move(text));
+}
 
 std::vector<std::string> AdviceOf(const StandinResult& result) {
   std::vector<std::string> advice;
-  const Spread& map = result.map_error;
-  if (map.worst > kSmall) {
-    advice.push_back(
-        fmt::format("With the neutral ratio motor torques are wrong by {} in the median, by more "
-                    "than {} in 5 % "
-                    "of the range (worst {}, at {})",
-                    Percent(map.median), Percent(map.p95), Percent(map.worst),
-                    PlaceText(result, result.poses[map.at].q)));
-  } else {
-    advice.push_back(fmt::format(
-        "The neutral ratio is right within {} over the whole range: a constant gear does",
-        Percent(map.worst)));
-  }
+  advice.push_back(MapSentence(result));
   advice.push_back(ReachSentence(result));
   for (const StandinScene& scene : result.scenes) {
     advice.push_back(ErrorSentence(result, scene));
@@ -589,6 +722,7 @@ std::vector<std::string> AdviceOf(const StandinResult& result) {
     }
     advice.push_back(std::move(text));
   }
+  if (!result.ends.empty()) advice.push_back(EndsSentence(result));
   for (std::string& sentence : advice) sentence = Sentence(std::move(sentence));
   return advice;
 }
@@ -596,7 +730,41 @@ std::vector<std::string> AdviceOf(const StandinResult& result) {
 std::string ToText(const StandinResult& result, const TextStyle& style) {
   std::string text = HeadLine(result) + "\n";
   for (const ReportSection& section : SectionsOf(result)) text += ToText(section, style);
-  return text;
+  return text + "\n" + VerdictOf(result) + "\n";
+}
+
+Json CountsJson(const char* key, const std::map<int, size_t>& counts) {
+  Json json = Json::array();
+  for (const auto& [count, poses] : counts) json.push_back({{key, count}, {"poses", poses}});
+  return json;
+}
+
+Json BranchesJson(const StandinResult& result) {
+  Json limbs = Json::array(), at_home = Json::array(), ends = Json::array();
+  for (size_t d = 0; d < result.limbs.size(); ++d) {
+    const StandinLimb& limb = result.limbs[d];
+    const bool two = std::isfinite(limb.apart);
+    limbs.push_back({{"drive", result.drives[d]},
+                     {"kind", limb.kind},
+                     {"home", Number(result.drives_home[Ix(d)])},
+                     {"other", Number(limb.other_home)},
+                     {"apart", Number(limb.apart)},
+                     {"apart_at", two ? VectorJson(result.poses[limb.apart_at].q) : Json()},
+                     {"other_way", limb.other_way}});
+  }
+  for (const VecX& q : result.poses_at_home) at_home.push_back(VectorJson(q));
+  for (const StandinEnd& end : result.ends) {
+    ends.push_back({{"joint", result.joints[end.joint]},
+                    {"up", end.up},
+                    {"at", Number(end.at)},
+                    {"by", WordOf(end.kind)},
+                    {"of", end.where}});
+  }
+  return {{"limbs", std::move(limbs)},
+          {"ways", CountsJson("ways", WaysOf(result))},
+          {"joint_poses", CountsJson("joint_poses", JointPosesOf(result))},
+          {"joint_poses_at_home", std::move(at_home)},
+          {"ends", std::move(ends)}};
 }
 
 Json ToJson(const StandinResult& result, const std::string& mechanism) {
@@ -645,9 +813,11 @@ Json ToJson(const StandinResult& result, const std::string& mechanism) {
             {"type2_at", VectorJson(type2.q)},
             {"type1", Number(1.0 / type1.largest)},
             {"type1_at", VectorJson(type1.q)}}},
+          {"branches", BranchesJson(result)},
           {"amplitude", Number(result.amplitude)},
           {"frequency_hz", Number(result.frequency_hz)},
           {"scenes", std::move(scenes)},
+          {"verdict", VerdictOf(result)},
           {"advice", AdviceOf(result)},
           {"notes", result.notes}};
 }
@@ -680,6 +850,8 @@ std::string StandinCsv(const StandinResult& result) {
   headings.push_back("smallest singular value [" + result.unit + "]");
   headings.push_back("largest singular value [" + result.unit + "]");
   headings.emplace_back("torque map error [1]");
+  headings.emplace_back("ways to put the limbs together");
+  headings.emplace_back("joint poses with these drives");
   for (const char* of : {"inertia", "rotors"}) {
     for (size_t i = 0; i < n; ++i) {
       for (size_t j = 0; j <= i; ++j) {
@@ -724,6 +896,8 @@ std::string StandinCsv(const StandinResult& result) {
     number(pose.least);
     number(pose.largest);
     number(pose.map_error);
+    number(pose.ways < 0 ? kNan : pose.ways);
+    number(pose.joint_poses < 0 ? kNan : pose.joint_poses);
     for (const MatX* matrix : {&pose.M, &pose.R}) {
       for (size_t i = 0; i < n; ++i) {
         for (size_t j = 0; j <= i; ++j) number(matrix->size() > 0 ? (*matrix)(Ix(i), Ix(j)) : kNan);
@@ -753,7 +927,7 @@ std::string StandinPage(const StandinResult& result, const std::string& mechanis
   for (const ReportSection& section : SectionsOf(result)) page.Add(section);
   return page.Write({.kicker = "mbverify standin",
                      .title = mechanism,
-                     .lead = HeadLine(result),
+                     .lead = VerdictOf(result) + " " + Sentence(HeadLine(result)),
                      .judges = false,
                      .footer = "standin.csv beside this page has every pose, standin.json the "
                                "numbers of this page."});

@@ -11,6 +11,9 @@
 
 namespace mbv {
 
+/// One sentence: how wrong a serial model is, and what helps most.
+[[nodiscard]] std::string VerdictOf(const StandinResult& result);
+
 /// Sentences to act on, the most important first.
 [[nodiscard]] std::vector<std::string> AdviceOf(const StandinResult& result);
 
