@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/files.h"
 #include "base/json_text.h"
 #include "base/output_folder.h"
 #include "base/text.h"
@@ -13,9 +14,15 @@
 #include "cli/terminal.h"
 #include "features/standin/standin_export.h"
 #include "features/standin/standin_report.h"
+#include "kinematics/constraints.h"
 #include "model_file/load_model.h"
+#include "model_file/write_model.h"
 #include "model_file/yaml/units.h"
+#include "reference/reference.h"
 #include "scenario/find_model.h"
+#include "scenario/load_scenario.h"
+#include "scenario/tables/motion_table.h"
+#include "scenario/tables/text.h"
 #include "verify/model_text.h"
 
 namespace mbv {
@@ -23,12 +30,184 @@ namespace {
 
 struct StandinArguments {
   std::string model, out = "out";
-  std::vector<std::string> joints, ranges, set;
+  std::vector<std::string> joints, ranges, set, motions;
   RobotArguments options;
   StandinSettings settings;
   bool quiet = false, exports = false;
   JsonOption json;
 };
+
+constexpr size_t kMostSamples = 2000;  // of a motion
+
+// Times of at most kMostSamples samples, `step_s` or a multiple of it apart.
+std::vector<double> SampleTimes(double from_s, double to_s, double step_s) {
+  const double steps = std::floor((to_s - from_s) / step_s * (1.0 + 1e-12));
+  const double stride = std::max(1.0, std::ceil(steps / static_cast<double>(kMostSamples)));
+  std::vector<double> times;
+  for (double k = 0.0; k <= steps; k += stride) times.push_back(from_s + k * step_s);
+  return times;
+}
+
+// Columns of a table (docs/how-to/standin.md): time, and each joint's position.
+class TableMotion {
+ public:
+  TableMotion(const std::string& file, const Mechanism& mechanism, Diagnostics* diagnostics)
+      : file_(file), mechanism_(mechanism), diagnostics_(*diagnostics) {}
+
+  std::optional<StandinMotion> Read(const std::vector<NamedCoordinate>& joints) {
+    const auto content = ReadWholeFile(file_);
+    if (!content) {
+      diagnostics_.AddError(file_, "cannot be read", "--motion SCENARIO or --motion TABLE.csv");
+      return std::nullopt;
+    }
+    const auto cut = CutTable(*content, file_, {}, &diagnostics_);
+    if (!cut) return std::nullopt;
+    std::vector<MotionTable> tables;
+    for (const NamedCoordinate& joint : joints) {
+      if (auto table = Load(*cut, joint)) tables.push_back(*std::move(table));
+    }
+    if (tables.size() != joints.size()) return std::nullopt;
+    double from_s = tables[0].from_s, to_s = tables[0].to_s;
+    std::string cutoffs;
+    for (const MotionTable& table : tables) {
+      from_s = std::max(from_s, table.from_s);
+      to_s = std::min(to_s, table.to_s);
+      if (!std::isfinite(table.cutoff_hz)) continue;
+      cutoffs += fmt::format(", {} smoothed above {:.3g} Hz", table.name, table.cutoff_hz);
+    }
+    const std::string name = std::filesystem::path(file_).filename().string();
+    const auto rows = static_cast<double>(tables[0].rows);
+    StandinMotion motion{.name = "along " + name, .text = {}, .q = {}, .v = {}};
+    for (const double t : SampleTimes(from_s, to_s, (to_s - from_s) / (rows - 1.0))) {
+      for (auto* list : {&motion.q, &motion.v, &motion.a}) list->emplace_back(joints.size());
+      for (size_t k = 0; k < joints.size(); ++k) {
+        const Jet jet = Evaluate(*tables[k].spline, t);
+        const auto at = static_cast<Eigen::Index>(k);
+        motion.q.back()[at] = jet.value;
+        motion.v.back()[at] = jet.rate;
+        motion.a.back()[at] = jet.acceleration;
+      }
+    }
+    motion.text =
+        fmt::format("{} rows over {:.4g} s, the joints alone{}", rows, to_s - from_s, cutoffs);
+    return motion;
+  }
+
+ private:
+  // NAME, NAME.position, or one of them with the unit as its last word.
+  [[nodiscard]] std::optional<MotionTable> Load(const TableText& cut,
+                                                const NamedCoordinate& joint) {
+    const std::string unit = CoordinateUnit(mechanism_, joint.coordinate);
+    std::vector<std::string> headings, units;
+    for (const TableHeading& heading : cut.headings) {
+      if (!heading.name.empty()) headings.push_back(heading.name);
+    }
+    std::string column;
+    for (const char* ending : {"", ".position", "_position", ".pos", "_pos"}) {
+      for (const char* suffix : {"", "_deg", "_rad", "_mm", "_m"}) {
+        if (!column.empty() || !Contains(headings, joint.name + ending + suffix)) continue;
+        column = joint.name + ending + suffix;
+        if (*suffix != '\0') units = {fmt::format(", unit: {}", suffix + 1)};
+      }
+    }
+    if (column.empty()) {
+      diagnostics_.AddError(
+          file_, "has no column for the position of '" + joint.name + "'",
+          DidYouMean(joint.name, headings, "its columns: " + Joined(headings, 8)));
+      return std::nullopt;
+    }
+    YamlReader yaml(file_);
+    const YamlNodePtr node =
+        yaml.Parse(fmt::format("{{csv: {}, column: {}, smoothing: auto{}}}",
+                               QuotedYaml(std::filesystem::path(file_).filename().string()),
+                               QuotedYaml(column), units.empty() ? "" : units[0]));
+    Scope scope;
+    ValueReader values(&yaml, &scope);
+    auto table = LoadMotionTable(&values, *node, joint.name, {joint.name, unit, true}, mechanism_,
+                                 &diagnostics_);
+    diagnostics_.Append(yaml.diagnostics());
+    return table;
+  }
+
+  const std::string& file_;
+  const Mechanism& mechanism_;
+  Diagnostics& diagnostics_;
+};
+
+// The joints' motion in a scenario, by the reference.
+std::optional<StandinMotion> ScenarioMotion(const std::string& file, const Mechanism& robot,
+                                            const std::vector<NamedCoordinate>& joints,
+                                            Diagnostics* diagnostics) {
+  ScenarioResult loaded = LoadScenario(file);
+  diagnostics->Append(loaded.diagnostics);
+  if (!loaded.scenario || !loaded.mechanism) return std::nullopt;
+  const auto refuse = [&](std::string message, std::string hint) {
+    diagnostics->AddError(file, std::move(message), std::move(hint));
+    return std::nullopt;
+  };
+  const Mechanism& mechanism = *loaded.mechanism;
+  const Motion& motion = loaded.scenario->motion;
+  if (motion.free()) {
+    return refuse("its motion follows from forces",
+                  "give the joints' positions as a table: --motion TABLE.csv");
+  }
+  const std::vector<NamedCoordinate> all = NamedJointCoordinates(mechanism);
+  std::vector<Coordinate> coordinates;
+  for (const NamedCoordinate& joint : joints) {
+    const auto at = std::ranges::find(all, joint.name, &NamedCoordinate::name);
+    if (at == all.end() ||
+        CoordinateUnit(mechanism, at->coordinate) != CoordinateUnit(robot, joint.coordinate)) {
+      return refuse("its model has no joint coordinate '" + joint.name + "'",
+                    "a scenario of this robot; there are: " + Joined(NamesOf(all), 8));
+    }
+    coordinates.push_back(at->coordinate);
+  }
+  StandinMotion result{.name = "along " + loaded.scenario->name, .text = {}, .q = {}, .v = {}};
+  ReferenceSolver solver(mechanism, motion);
+  CommandSample command;
+  ReferenceSample sample;
+  std::vector<double> near;
+  for (const Coordinate& coordinate : coordinates) near.push_back(HomeValue(mechanism, coordinate));
+  for (const double t : SampleTimes(0.0, motion.duration_s, motion.sample_s)) {
+    EvaluateMotion(motion, t, &command);
+    if (const RunSummary moved = solver.Kinematics(command, &sample); !moved.ok()) {
+      return refuse(fmt::format("at t = {:.4g} s: {}", t, moved.message), "");
+    }
+    for (auto* list : {&result.q, &result.v, &result.a}) list->emplace_back(coordinates.size());
+    for (size_t k = 0; k < coordinates.size(); ++k) {
+      const ScalarRow row = CoordinateRow(mechanism, coordinates[k], sample.states, near[k]);
+      const auto at = static_cast<Eigen::Index>(k);
+      near[k] = result.q.back()[at] = row.value;
+      result.v.back()[at] = RateOf(row, sample.states.V_WB);
+      result.a.back()[at] = RateOf(row, sample.states.A_WB) + row.bias;
+    }
+  }
+  result.text = fmt::format("the joints' motion in {} over {:.4g} s, the joints alone", Shown(file),
+                            motion.duration_s);
+  return result;
+}
+
+// False after a finding.
+bool ReadMotions(const std::vector<std::string>& motions, const std::vector<std::string>& names,
+                 const Mechanism& robot, StandinSettings* settings) {
+  std::vector<NamedCoordinate> joints;
+  const std::vector<NamedCoordinate> all = NamedJointCoordinates(robot);
+  for (const std::string& name : names) {
+    const auto at = std::ranges::find(all, name, &NamedCoordinate::name);
+    if (at == all.end()) return true;  // a finding of FindTransmission()
+    joints.push_back(*at);
+  }
+  Diagnostics diagnostics;
+  for (const std::string& text : motions) {
+    const std::string ending = std::filesystem::path(text).extension().string();
+    const bool table = ending == ".csv" || ending == ".tsv" || ending == ".txt" || ending == ".dat";
+    auto motion = table ? TableMotion(text, robot, &diagnostics).Read(joints)
+                        : ScenarioMotion(FindScenario(text), robot, joints, &diagnostics);
+    if (motion) settings->motions.push_back(*std::move(motion));
+  }
+  SayText(stderr, diagnostics.Text());
+  return !diagnostics.has_errors();
+}
 
 // "pitch_deg=-50:30".
 bool ReadRange(const std::string& text, const Mechanism& mechanism,
@@ -86,6 +265,7 @@ int Standin(const StandinArguments& arguments) {
   for (const std::string& range : arguments.ranges) {
     if (!ReadRange(range, mechanism, arguments.joints, &settings)) return 2;
   }
+  if (!ReadMotions(arguments.motions, arguments.joints, mechanism, &settings)) return 2;
   ProgressLine line(!arguments.quiet);
   std::function<void(double)> progress;
   if (line.active()) {
@@ -148,6 +328,11 @@ void AddStandinCommand(CLI::App* app, int* exit_code) {
                    "joint's limits or home ± 30°")
       ->allow_extra_args(false);
   standin
+      ->add_option("--motion", arguments->motions,
+                   "scenario or table (.csv) whose motion of the joints is compared along, too "
+                   "(repeatable)")
+      ->allow_extra_args(false);
+  standin
       ->add_option("--resolution", arguments->settings.resolution,
                    "poses along each joint; otherwise 201, 41, 11 or 5 by the number of joints")
       ->check(CLI::Range(2, 100000));
@@ -172,7 +357,9 @@ void AddStandinCommand(CLI::App* app, int* exit_code) {
   arguments->json.AddTo(standin);
   SetFooter(standin,
             {"standin my_robot.urdf --joints ankle_pitch,ankle_roll",
-             "standin my_robot.xml --joints knee --range knee_deg=0:110 --frequency 2"},
+             "standin my_robot.xml --joints knee --range knee_deg=0:110 --frequency 2",
+             "standin my_robot.urdf --joints ankle_pitch,ankle_roll --motion walk.csv",
+             "standin my_robot.urdf --joints ankle_pitch,ankle_roll --export"},
             "0 computed, 1 an export differs from the full loop, 2 bad input, 3 results could not "
             "be written, 4 internal error");
   standin->callback([arguments, exit_code] { *exit_code = Standin(*arguments); });

@@ -696,7 +696,7 @@ std::string VerdictOf(const StandinResult& result) {
   if (scene.states > 0 && whole.share > kSmall) {
     const size_t cause = LargestCause(scene);
     text += fmt::format(
-        "; {}, with masses and rotors, {} is wrong by {} of what it needs in 5 % "
+        "; {}, with masses and rotors, {} is wrong by more than {} of what it needs in 5 % "
         "of the states, mostly by {}: {}",
         scene.name, result.drives[whole.drive], Percent(whole.share), kCauseNames.at(cause),
         RemedyOf(cause));
