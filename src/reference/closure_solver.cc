@@ -302,6 +302,7 @@ RunSummary ClosureSolver::Follow(const VecX& target, int first_steps) {
         step = 1.0 / first_steps;
         continue;
       }
+      if (!options_.explain_unreached) return Failed(Stop::kUnreachable, "the pose is not reached");
       return ExplainUnreached(mechanism_, commands_, target, states_, near_values_);
     }
   }

@@ -54,13 +54,14 @@ struct ReducedModel::Impl {
   }
 
   void Begin() {
-    closure.emplace(mechanism, motion, ReferenceOptions{});
+    closure.emplace(mechanism, motion, options);
     forces.emplace(mechanism, motion.duration_s);
     recorder.emplace(mechanism);
   }
 
   const Mechanism& mechanism;
   const Motion motion;
+  ReferenceOptions options;
   std::optional<internal::ClosureSolver> closure;
   std::optional<internal::ForceSolver> forces;
   std::optional<internal::SampleRecorder> recorder;
@@ -89,6 +90,7 @@ VecX ReducedModel::home() const {
 }
 
 void ReducedModel::Restart() { impl_->Begin(); }
+void ReducedModel::Explain(bool on) { impl_->options.explain_unreached = on; }
 
 RunSummary ReducedModel::Move(const VecX& q, const VecX& v, const VecX& a) {
   MBV_DEMAND(q.size() == size() && v.size() == size() && a.size() == size(), q.size());

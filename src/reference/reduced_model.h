@@ -46,6 +46,9 @@ class ReducedModel {
   [[nodiscard]] RunSummary Move(const VecX& q, const VecX& v, const VecX& a);
   /// Forgets the pose: the next call begins at home.
   void Restart();
+  /// Whether Move() searches what stays open where it fails (ReferenceOptions), from the next
+  /// Restart() or failure on.
+  void Explain(bool on);
 
   // Of the state that Move() reached last.
 

@@ -21,6 +21,8 @@ struct ReferenceOptions {
   int max_iterations = 30;             ///< per sample, > 0
   int homotopy_steps = 40;             ///< at most at first, from home to the first sample; > 0
   bool reactions = true;               ///< record every joint's reaction channels
+  /// Of a pose that is not reached, search what stays open: many times the work of reaching one.
+  bool explain_unreached = true;
 };
 
 /// Where power comes from and goes to [W].

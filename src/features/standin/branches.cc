@@ -62,47 +62,75 @@ struct StandinBranches::Impl {
     return joint.kind == JointKind::kRevolute || joint.kind == JointKind::kUniversal ||
            joint.kind == JointKind::kSpherical;
   }
-  [[nodiscard]] std::vector<int> JointsOn(int body) const {
-    std::vector<int> on;
-    for (size_t j = 0; j < mechanism.joints.size(); ++j) {
-      const Joint& joint = mechanism.joints[j];
-      if (joint.parent == body || joint.child == body) on.push_back(static_cast<int>(j));
+  // The joints of a body and of those that fixed joints weld to it; with a kept body among these,
+  // that one alone is of interest.
+  struct Welded {
+    int kept = -1;
+    std::vector<int> bodies, joints;
+  };
+  [[nodiscard]] Welded WeldedTo(int body) const {
+    Welded welded{.bodies = {body}, .joints = {}};
+    std::vector<int>& bodies = welded.bodies;
+    for (size_t b = 0; b < bodies.size(); ++b) {
+      if (Kept(bodies[b])) {
+        welded.kept = bodies[b];
+        return welded;
+      }
+      for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+        const Joint& joint = mechanism.joints[j];
+        if (joint.parent != bodies[b] && joint.child != bodies[b]) continue;
+        const int other = joint.parent == bodies[b] ? joint.child : joint.parent;
+        if (joint.kind != JointKind::kFixed) {
+          welded.joints.push_back(static_cast<int>(j));
+        } else if (std::ranges::count(bodies, other) == 0) {
+          bodies.push_back(other);
+        }
+      }
     }
-    return on;
+    return welded;
   }
   [[nodiscard]] const Joint& JointAt(int j) const {
     return mechanism.joints[static_cast<size_t>(j)];
   }
-  [[nodiscard]] Vec3 PointOn(int body, int j) const {
+  // Of a joint, at home in the world.
+  [[nodiscard]] Vec3 PointOf(int j) const {
     const Joint& joint = JointAt(j);
-    return (joint.parent == body ? joint.X_PF : joint.X_CM).translation();
+    return AtHome(joint.parent) * joint.X_PF.translation();
+  }
+  [[nodiscard]] const Pose& AtHome(int body) const {
+    return mechanism.X_WB_home[static_cast<size_t>(body)];
   }
   [[nodiscard]] bool Kept(int body) const { return transmission.kept[static_cast<size_t>(body)]; }
 
   // From the one joint of `body` beside `not_this` on, through bodies that are mere points, at most
-  // one rod among them, to a body that the joints move.
+  // one rod among them, to a body that the joints move. `first`: the point where it begins, at home
+  // in the world.
   [[nodiscard]] std::optional<LimbEnd> Follow(int body, int not_this, bool with_rod,
                                               Vec3* first) const {
     LimbEnd end;
+    Vec3 at = Vec3::Zero();  // where the body before ended
     for (bool begun = false;; begun = true) {
-      std::vector<int> on = JointsOn(body);
-      std::erase(on, not_this);
-      if (on.size() != 1 || !IsPoint(JointAt(on[0]))) return std::nullopt;
-      const Vec3 p = PointOn(body, on[0]);
+      Welded here = WeldedTo(body);
+      if (here.kept >= 0) {
+        if (!begun || with_rod != (end.rod > 0.0)) return std::nullopt;
+        end.body = here.kept;
+        end.p_B = AtHome(here.kept).inverse() * at;
+        return end;
+      }
+      std::erase(here.joints, not_this);
+      if (here.joints.size() != 1 || !IsPoint(JointAt(here.joints[0]))) return std::nullopt;
+      not_this = here.joints[0];
+      const Vec3 p = PointOf(not_this);
       if (!begun) {
         *first = p;
-      } else if (const double length = (p - PointOn(body, not_this)).norm(); length > kSamePoint) {
+      } else if (const double length = (p - at).norm(); length > kSamePoint) {
         if (!with_rod || end.rod > 0.0) return std::nullopt;
         end.rod = length;
       }
-      not_this = on[0];
+      at = p;
+      // The side of the joint that is not welded to this body.
       const Joint& joint = JointAt(not_this);
-      body = joint.parent == body ? joint.child : joint.parent;
-      if (!Kept(body)) continue;
-      if (with_rod && end.rod == 0.0) return std::nullopt;
-      end.body = body;
-      end.p_B = PointOn(body, not_this);
-      return end;
+      body = std::ranges::count(here.bodies, joint.parent) > 0 ? joint.child : joint.parent;
     }
   }
 
@@ -137,7 +165,7 @@ struct StandinBranches::Impl {
       if (!end) return limb;
       limb.base = forth ? joint.parent : joint.child;
       limb.X_BJ = forth ? joint.X_PF : joint.X_CM;
-      limb.a = (forth ? joint.X_CM : joint.X_PF).inverse() * near;
+      limb.a = (forth ? joint.X_CM : joint.X_PF).inverse() * (AtHome(crank).inverse() * near);
       limb.sign = forth ? 1.0 : -1.0;
       limb.end = end->body;
       limb.p_end = end->p_B;
@@ -151,7 +179,8 @@ struct StandinBranches::Impl {
       limb.p_base = base->p_B;
       limb.end = end->body;
       limb.p_end = end->p_B;
-      limb.a = joint.X_CM.inverse() * far - joint.X_PF.inverse() * near;
+      limb.a = joint.X_CM.inverse() * (AtHome(joint.child).inverse() * far) -
+               joint.X_PF.inverse() * (AtHome(joint.parent).inverse() * near);
       limb.side = joint.home[0] + limb.a.dot(limb.axis) < 0.0 ? -1.0 : 1.0;
       limb.kind = Limb::Kind::kCylinder;
     }

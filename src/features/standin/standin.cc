@@ -91,6 +91,11 @@ class Parts {
       Restart();
       summary = MoveParts(q, v, a, all);
     }
+    // What stays open is searched once where many poses stay open one after the other.
+    full_.Explain(summary.ok());
+    if (summary.ok()) where_.clear();
+    if (summary.where.empty()) summary.where = where_;
+    where_ = summary.where;
     at_home_ = !summary.ok();
     if (!summary.ok()) Restart();
     return summary;
@@ -183,6 +188,7 @@ class Parts {
                &serial_ = serial_part_.model, &loop_ = loop_part_.model;
   const VecX home_;
   bool at_home_ = true;
+  std::string where_;  // of the pose before, if it was open
   MatX T_, J_;
   VecX v_, a_;
 };
@@ -577,7 +583,7 @@ class StandinComputer {
     for (int i = 1; i <= kSteps && end.kind == Kind::kNone; ++i) {
       double bad = most * i / kSteps;
       Kind kind = look(bad);
-      for (int k = 0; k < 24 && kind != Kind::kNone; ++k) {
+      for (int k = 0; k < (kind == Kind::kOpen ? 12 : 24) && kind != Kind::kNone; ++k) {
         const double middle = 0.5 * (good + bad);
         const std::string where = end.where;
         if (const Kind there = look(middle); there == Kind::kNone) {
