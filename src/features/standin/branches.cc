@@ -29,7 +29,7 @@ namespace {
 
 constexpr double kSamePoint = 1e-9;  // [m]: joints of a body there meet in a point
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr int kSteps = 360;  // of a turn
+constexpr int kSteps = 720;  // of a turn
 
 size_t Nth(Eigen::Index k) { return static_cast<size_t>(k); }
 
@@ -285,7 +285,8 @@ struct StandinBranches::Impl {
 
   // Zeros over a turn of a function that is NaN where it has no value.
   template <typename Function>
-  static void Zeros(const Function& f, std::vector<double>* zeros) {
+  static std::vector<double> Zeros(const Function& f) {
+    std::vector<double> zeros;
     const auto bisect = [](double low, double high, const auto& is_low) {
       for (int i = 0; i < 50; ++i) {
         const double middle = 0.5 * (low + high);
@@ -293,43 +294,23 @@ struct StandinBranches::Impl {
       }
       return low;
     };
-    // Adds the zero between two places where the signs differ.
-    const auto between = [&](double low, double high) {
-      const bool negative = f(low) < 0.0;
-      if (negative == (f(high) < 0.0)) return false;
-      zeros->push_back(bisect(low, high, [&](double t) { return (f(t) < 0.0) == negative; }));
-      return true;
-    };
-    const auto at = [](int i) { return kTurn * i / kSteps - std::numbers::pi; };
-    std::array<double, kSteps + 1> values;
-    for (int i = 0; i <= kSteps; ++i) values[static_cast<size_t>(i)] = f(at(i));
-    for (int i = 0; i < kSteps; ++i) {
-      const double here = values[static_cast<size_t>(i)], next = values[static_cast<size_t>(i) + 1];
-      if (std::isnan(here) != std::isnan(next)) {
-        const double in = std::isnan(here) ? at(i + 1) : at(i);
-        const double out = std::isnan(here) ? at(i) : at(i + 1);
-        between(in, bisect(in, out, [&](double t) { return !std::isnan(f(t)); }));
-        continue;
-      }
-      if (std::isnan(here)) continue;
-      if ((here < 0.0) != (next < 0.0)) {
-        between(at(i), at(i + 1));
-        continue;
-      }
-      // Nearest to zero here: a pair of zeros may lie beside it.
-      const double before = i > 0 ? values[static_cast<size_t>(i) - 1] : kNan;
-      if (!(std::abs(here) < std::abs(before) && std::abs(here) < std::abs(next)) ||
-          (before < 0.0) != (here < 0.0)) {
-        continue;
-      }
-      double low = at(i - 1), high = at(i + 1);
-      for (int k = 0; k < 40; ++k) {
-        const double third = (high - low) / 3.0;
-        (std::abs(f(low + third)) < std::abs(f(high - third)) ? high : low) =
-            std::abs(f(low + third)) < std::abs(f(high - third)) ? high - third : low + third;
-      }
-      if (between(at(i - 1), low)) between(low, at(i + 1));
+    double t0 = -std::numbers::pi, f0 = f(t0);
+    for (int i = 1; i <= kSteps; ++i) {
+      double low = t0, f_low = f0;
+      const double t = kTurn * i / kSteps - std::numbers::pi, f_t = f(t);
+      t0 = t;
+      f0 = f_t;
+      if (std::isnan(f_low) && std::isnan(f_t)) continue;
+      double high = t, f_high = f_t;
+      // Where the function ends or begins, as far as it has values.
+      const auto known = [&](double x) { return !std::isnan(f(x)); };
+      if (std::isnan(f_t)) f_high = f(high = bisect(low, high, known));
+      if (std::isnan(f_low)) f_low = f(low = bisect(high, low, known));
+      const bool negative = f_low < 0.0;
+      if (negative == (f_high < 0.0)) continue;
+      zeros.push_back(bisect(low, high, [&](double x) { return (f(x) < 0.0) == negative; }));
     }
+    return zeros;
   }
 
   const Mechanism& mechanism;
@@ -406,15 +387,11 @@ std::optional<std::vector<VecX>> StandinBranches::Poses(const VecX& drives) cons
           impl.Solve(impl.limbs[Nth(first)], drives[first], joint, &q, &roots);
           q[joint] = roots[way];
         };
-        std::vector<double> zeros;
-        Impl::Zeros(
-            [&](double t) {
-              at(t);
-              return std::isnan(q[joint])
-                         ? kNan
-                         : impl.Off(impl.limbs[Nth(1 - first)], q, drives[1 - first]);
-            },
-            &zeros);
+        const std::vector<double> zeros = Impl::Zeros([&](double t) {
+          at(t);
+          return std::isnan(q[joint]) ? kNan
+                                      : impl.Off(impl.limbs[Nth(1 - first)], q, drives[1 - first]);
+        });
         for (const double zero : zeros) {
           at(zero);
           poses.push_back(q.unaryExpr([](double x) { return std::remainder(x, kTurn); }));

@@ -601,9 +601,21 @@ class StandinComputer {
     // The reference stops short of a dead centre.
     constexpr double kShort = 1e-3;
     q[joint] = home + (up ? 1.0 : -1.0) * (good + kShort * most);
-    if (const std::string drive = OutOfReach(q); end.kind == Kind::kOpen && !drive.empty()) {
+    if (end.kind != Kind::kOpen) return end;
+    if (const std::string drive = OutOfReach(q); !drive.empty()) {
       end.kind = Kind::kDeadCentre;
       end.where = drive;
+      return end;
+    }
+    // Of limbs of other kinds: a drive whose rate by the joint's grows without bound.
+    constexpr double kUnbounded = 20.0;
+    q[joint] = end.at;
+    if (!parts_->Move(q, still, still, false).ok()) return end;
+    const MatX rates = scale_.Scaled(parts_->J()).cwiseAbs();
+    Eigen::Index drive = 0;
+    if (rates.col(joint).maxCoeff(&drive) > kUnbounded * result_.largest_home) {
+      end.kind = Kind::kDeadCentre;
+      end.where = result_.drives[At(drive)];
     }
     return end;
   }

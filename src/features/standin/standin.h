@@ -181,7 +181,8 @@ class StandinBranches {
   /// Of a known limb.
   [[nodiscard]] std::vector<double> Ways(Eigen::Index drive, const VecX& q, double* apart) const;
   /// All poses of the joints over a turn for positions of the drives; nothing with more than two
-  /// joints, joints that slide, or unknown limbs. Two zeros nearer than a degree may be missed.
+  /// joints, joints that slide, or unknown limbs. Two of them less than half a degree apart may be
+  /// missed.
   [[nodiscard]] std::optional<std::vector<VecX>> Poses(const VecX& drives) const;
 
  private:

@@ -48,91 +48,79 @@ std::vector<double> SampleTimes(double from_s, double to_s, double step_s) {
   return times;
 }
 
-// Columns of a table (docs/how-to/standin.md): time, and each joint's position.
-class TableMotion {
- public:
-  TableMotion(const std::string& file, const Mechanism& mechanism, Diagnostics* diagnostics)
-      : file_(file), mechanism_(mechanism), diagnostics_(*diagnostics) {}
-
-  std::optional<StandinMotion> Read(const std::vector<NamedCoordinate>& joints) {
-    const auto content = ReadWholeFile(file_);
-    if (!content) {
-      diagnostics_.AddError(file_, "cannot be read", "--motion SCENARIO or --motion TABLE.csv");
-      return std::nullopt;
+// A column of a table (docs/how-to/standin.md) as a spline: NAME or NAME.position, and _deg and the
+// like behind it.
+std::optional<MotionTable> TableColumnOf(const std::string& file, const TableText& cut,
+                                         const NamedCoordinate& joint, const Mechanism& mechanism,
+                                         Diagnostics* diagnostics) {
+  std::vector<std::string> headings;
+  for (const TableHeading& heading : cut.headings) headings.push_back(heading.name);
+  std::string keys;
+  for (const char* ending : {"", ".position", "_position", "_pos"}) {
+    for (const std::string unit : {"", "deg", "rad", "mm", "m"}) {
+      const std::string column = joint.name + ending + (unit.empty() ? "" : "_" + unit);
+      if (!keys.empty() || !Contains(headings, column)) continue;
+      keys = "column: " + QuotedYaml(column) + (unit.empty() ? "" : ", unit: " + unit);
     }
-    const auto cut = CutTable(*content, file_, {}, &diagnostics_);
-    if (!cut) return std::nullopt;
-    std::vector<MotionTable> tables;
-    for (const NamedCoordinate& joint : joints) {
-      if (auto table = Load(*cut, joint)) tables.push_back(*std::move(table));
-    }
-    if (tables.size() != joints.size()) return std::nullopt;
-    double from_s = tables[0].from_s, to_s = tables[0].to_s;
-    std::string cutoffs;
-    for (const MotionTable& table : tables) {
-      from_s = std::max(from_s, table.from_s);
-      to_s = std::min(to_s, table.to_s);
-      if (!std::isfinite(table.cutoff_hz)) continue;
-      cutoffs += fmt::format(", {} smoothed above {:.3g} Hz", table.name, table.cutoff_hz);
-    }
-    const std::string name = std::filesystem::path(file_).filename().string();
-    const auto rows = static_cast<double>(tables[0].rows);
-    StandinMotion motion{.name = "along " + name, .text = {}, .q = {}, .v = {}};
-    for (const double t : SampleTimes(from_s, to_s, (to_s - from_s) / (rows - 1.0))) {
-      for (auto* list : {&motion.q, &motion.v, &motion.a}) list->emplace_back(joints.size());
-      for (size_t k = 0; k < joints.size(); ++k) {
-        const Jet jet = Evaluate(*tables[k].spline, t);
-        const auto at = static_cast<Eigen::Index>(k);
-        motion.q.back()[at] = jet.value;
-        motion.v.back()[at] = jet.rate;
-        motion.a.back()[at] = jet.acceleration;
-      }
-    }
-    motion.text =
-        fmt::format("{} rows over {:.4g} s, the joints alone{}", rows, to_s - from_s, cutoffs);
-    return motion;
   }
-
- private:
-  // NAME, NAME.position, or one of them with the unit as its last word.
-  [[nodiscard]] std::optional<MotionTable> Load(const TableText& cut,
-                                                const NamedCoordinate& joint) {
-    const std::string unit = CoordinateUnit(mechanism_, joint.coordinate);
-    std::vector<std::string> headings, units;
-    for (const TableHeading& heading : cut.headings) {
-      if (!heading.name.empty()) headings.push_back(heading.name);
-    }
-    std::string column;
-    for (const char* ending : {"", ".position", "_position", ".pos", "_pos"}) {
-      for (const char* suffix : {"", "_deg", "_rad", "_mm", "_m"}) {
-        if (!column.empty() || !Contains(headings, joint.name + ending + suffix)) continue;
-        column = joint.name + ending + suffix;
-        if (*suffix != '\0') units = {fmt::format(", unit: {}", suffix + 1)};
-      }
-    }
-    if (column.empty()) {
-      diagnostics_.AddError(
-          file_, "has no column for the position of '" + joint.name + "'",
-          DidYouMean(joint.name, headings, "its columns: " + Joined(headings, 8)));
-      return std::nullopt;
-    }
-    YamlReader yaml(file_);
-    const YamlNodePtr node =
-        yaml.Parse(fmt::format("{{csv: {}, column: {}, smoothing: auto{}}}",
-                               QuotedYaml(std::filesystem::path(file_).filename().string()),
-                               QuotedYaml(column), units.empty() ? "" : units[0]));
-    Scope scope;
-    ValueReader values(&yaml, &scope);
-    auto table = LoadMotionTable(&values, *node, joint.name, {joint.name, unit, true}, mechanism_,
-                                 &diagnostics_);
-    diagnostics_.Append(yaml.diagnostics());
-    return table;
+  if (keys.empty()) {
+    diagnostics->AddError(file, "has no column for the position of '" + joint.name + "'",
+                          DidYouMean(joint.name, headings, "its columns: " + Joined(headings, 8)));
+    return std::nullopt;
   }
+  YamlReader yaml(file);
+  const YamlNodePtr node =
+      yaml.Parse(fmt::format("{{csv: {}, {}, smoothing: auto}}",
+                             QuotedYaml(std::filesystem::path(file).filename().string()), keys));
+  Scope scope;
+  ValueReader values(&yaml, &scope);
+  auto table = LoadMotionTable(&values, *node, joint.name,
+                               {joint.name, CoordinateUnit(mechanism, joint.coordinate), true},
+                               mechanism, diagnostics);
+  diagnostics->Append(yaml.diagnostics());
+  return table;
+}
 
-  const std::string& file_;
-  const Mechanism& mechanism_;
-  Diagnostics& diagnostics_;
-};
+std::optional<StandinMotion> TableMotion(const std::string& file, const Mechanism& mechanism,
+                                         const std::vector<NamedCoordinate>& joints,
+                                         Diagnostics* diagnostics) {
+  const auto content = ReadWholeFile(file);
+  if (!content) {
+    diagnostics->AddError(file, "cannot be read", "--motion SCENARIO or --motion TABLE.csv");
+    return std::nullopt;
+  }
+  const auto cut = CutTable(*content, file, {}, diagnostics);
+  if (!cut) return std::nullopt;
+  std::vector<MotionTable> tables;
+  for (const NamedCoordinate& joint : joints) {
+    if (auto table = TableColumnOf(file, *cut, joint, mechanism, diagnostics)) {
+      tables.push_back(*std::move(table));
+    }
+  }
+  if (tables.size() != joints.size()) return std::nullopt;
+  const double from_s = tables[0].from_s, to_s = tables[0].to_s;
+  StandinMotion motion{
+      .name = "along " + std::filesystem::path(file).filename().string(),
+      .text = fmt::format("{} rows over {:.4g} s, the joints alone", tables[0].rows, to_s - from_s),
+      .q = {},
+      .v = {}};
+  for (const MotionTable& table : tables) {
+    if (!std::isfinite(table.cutoff_hz)) continue;
+    motion.text += fmt::format(", {} smoothed above {:.3g} Hz", table.name, table.cutoff_hz);
+  }
+  const double step_s = (to_s - from_s) / static_cast<double>(tables[0].rows - 1);
+  for (const double t : SampleTimes(from_s, to_s, step_s)) {
+    for (auto* list : {&motion.q, &motion.v, &motion.a}) list->emplace_back(joints.size());
+    for (size_t k = 0; k < joints.size(); ++k) {
+      const Jet jet = Evaluate(*tables[k].spline, t);
+      const auto at = static_cast<Eigen::Index>(k);
+      motion.q.back()[at] = jet.value;
+      motion.v.back()[at] = jet.rate;
+      motion.a.back()[at] = jet.acceleration;
+    }
+  }
+  return motion;
+}
 
 // The joints' motion in a scenario, by the reference.
 std::optional<StandinMotion> ScenarioMotion(const std::string& file, const Mechanism& robot,
@@ -201,7 +189,7 @@ bool ReadMotions(const std::vector<std::string>& motions, const std::vector<std:
   for (const std::string& text : motions) {
     const std::string ending = std::filesystem::path(text).extension().string();
     const bool table = ending == ".csv" || ending == ".tsv" || ending == ".txt" || ending == ".dat";
-    auto motion = table ? TableMotion(text, robot, &diagnostics).Read(joints)
+    auto motion = table ? TableMotion(text, robot, joints, &diagnostics)
                         : ScenarioMotion(FindScenario(text), robot, joints, &diagnostics);
     if (motion) settings->motions.push_back(*std::move(motion));
   }

@@ -823,101 +823,93 @@ Json ToJson(const StandinResult& result, const std::string& mechanism) {
 }
 
 std::string StandinCsv(const StandinResult& result) {
-  std::vector<std::string> headings;
+  struct CsvColumn {
+    std::string heading;
+    std::function<std::string(const StandinPose&)> cell;
+  };
+  std::vector<CsvColumn> columns;
   const size_t n = result.joints.size();
-  const auto per = [&](const std::vector<std::string>& names, const std::string& what,
-                       const std::function<std::string(size_t)>& unit) {
-    for (size_t k = 0; k < n; ++k) headings.push_back(names[k] + what + " [" + unit(k) + "]");
+  const auto add = [&](const std::string& what, const std::string& unit, auto value) {
+    columns.push_back(
+        {what + (unit.empty() ? "" : " [" + unit + "]"), [value](const StandinPose& pose) {
+           const double number = value(pose);
+           return std::isfinite(number) ? fmt::format("{:.17g}", number) : "";
+         }});
+  };
+  // Of a vector or matrix that a pose may not have.
+  const auto entry = [](const auto& values, size_t i, size_t j = 0) {
+    return values.size() > 0 ? values(Ix(i), Ix(j)) : kNan;
+  };
+  const auto add_vector = [&](const std::vector<std::string>& names, const std::string& what,
+                              const auto& unit, auto of) {
+    for (size_t k = 0; k < n; ++k) {
+      add(names[k] + what, unit(k), [=](const StandinPose& pose) { return entry(of(pose), k); });
+    }
   };
   const auto joint_unit = [&](size_t k) { return result.joint_units[k]; };
   const auto drive_unit = [&](size_t k) { return result.drive_units[k]; };
-  const auto inertia_unit = [&](size_t i, size_t j) {
-    const size_t lengths =
-        (result.joint_units[i] == "m" ? 1 : 0) + (result.joint_units[j] == "m" ? 1 : 0);
-    return lengths == 0 ? "kg m²" : lengths == 1 ? "kg m" : "kg";
-  };
-  const auto force_unit = [&](size_t k) { return ForceUnitOf(result.drive_units[k]); };
-  per(result.joints, "", joint_unit);
-  headings.emplace_back("status");
-  headings.emplace_back("where");
-  per(result.drives, "", drive_unit);
+  const auto joint_rate = [&](size_t k) { return result.joint_units[k] + "/s"; };
+  const auto joint_force = [&](size_t k) { return ForceUnitOf(result.joint_units[k]); };
+  const auto drive_force = [&](size_t k) { return ForceUnitOf(result.drive_units[k]); };
+  add_vector(result.joints, "", joint_unit, [](const StandinPose& pose) { return pose.q; });
+  columns.push_back({"status", [](const StandinPose& pose) { return WordOf(pose.status); }});
+  columns.push_back({"where", [](const StandinPose& pose) { return CsvCell(pose.where); }});
+  add_vector(result.drives, "", drive_unit, [](const StandinPose& pose) { return pose.drives; });
   for (size_t d = 0; d < n; ++d) {
     for (size_t k = 0; k < n; ++k) {
-      headings.push_back(fmt::format("d {} / d {} [{}/{}]", result.drives[d], result.joints[k],
-                                     drive_unit(d), joint_unit(k)));
+      add(fmt::format("d {} / d {}", result.drives[d], result.joints[k]),
+          drive_unit(d) + "/" + joint_unit(k),
+          [=](const StandinPose& pose) { return entry(pose.J, d, k); });
     }
   }
-  headings.push_back("smallest singular value [" + result.unit + "]");
-  headings.push_back("largest singular value [" + result.unit + "]");
-  headings.emplace_back("torque map error [1]");
-  headings.emplace_back("ways to put the limbs together");
-  headings.emplace_back("joint poses with these drives");
-  for (const char* of : {"inertia", "rotors"}) {
+  add("smallest singular value", result.unit, [](const StandinPose& pose) { return pose.least; });
+  add("largest singular value", result.unit, [](const StandinPose& pose) { return pose.largest; });
+  add("torque map error", "1", [](const StandinPose& pose) { return pose.map_error; });
+  const auto count = [](int value) { return value < 0 ? kNan : value; };
+  add("ways to put the limbs together", "",
+      [=](const StandinPose& pose) { return count(pose.ways); });
+  add("joint poses with these drives", "",
+      [=](const StandinPose& pose) { return count(pose.joint_poses); });
+  for (const bool all : {true, false}) {
     for (size_t i = 0; i < n; ++i) {
       for (size_t j = 0; j <= i; ++j) {
-        headings.push_back(fmt::format("{} {} {} [{}]", of, result.joints[i], result.joints[j],
-                                       inertia_unit(i, j)));
+        const size_t lengths = static_cast<size_t>(std::ranges::count(
+            std::array{result.joint_units[i], result.joint_units[j]}, std::string("m")));
+        add(fmt::format("{} {} {}", all ? "inertia" : "rotors", result.joints[i], result.joints[j]),
+            std::array{"kg m²", "kg m", "kg"}.at(lengths),
+            [=](const StandinPose& pose) { return entry(all ? pose.M : pose.R, i, j); });
       }
     }
   }
-  per(result.joints, " peak torque alone",
-      [&](size_t k) { return ForceUnitOf(result.joint_units[k]); });
-  per(result.joints, " highest rate alone", [&](size_t k) { return result.joint_units[k] + "/s"; });
-  const bool polygons[] = {n == 2 && result.torque_limits, n == 2 && result.speed_limits};
+  add_vector(result.joints, " peak torque alone", joint_force,
+             [](const StandinPose& pose) { return pose.torque_alone; });
+  add_vector(result.joints, " highest rate alone", joint_rate,
+             [](const StandinPose& pose) { return pose.speed_alone; });
   for (const bool torque : {true, false}) {
-    if (!polygons[torque ? 0 : 1]) continue;
-    for (const char* corner : {" corner 1", " corner 2"}) {
-      per(result.joints, std::string(torque ? " torque" : " rate") + corner, [&](size_t k) {
-        return torque ? ForceUnitOf(result.joint_units[k]) : result.joint_units[k] + "/s";
-      });
+    if (n != 2 || !(torque ? result.torque_limits : result.speed_limits)) continue;
+    for (const size_t corner : {size_t{0}, size_t{1}}) {
+      for (size_t k = 0; k < n; ++k) {
+        add(fmt::format("{} {} corner {}", result.joints[k], torque ? "torque" : "rate",
+                        corner + 1),
+            torque ? joint_force(k) : joint_rate(k), [=, &result](const StandinPose& pose) {
+              return pose.status == PoseStatus::kUsable ? CornersAt(result, pose, torque)[corner][k]
+                                                        : kNan;
+            });
+      }
     }
   }
-  per(result.drives, " at rest", force_unit);
-  for (const char* cause : kCauseNames) {
-    per(result.drives, std::string(" error at rest: ") + cause, force_unit);
+  add_vector(result.drives, " at rest", drive_force,
+             [](const StandinPose& pose) { return pose.rest.full; });
+  for (size_t c = 0; c <= kWhole; ++c) {
+    add_vector(result.drives, std::string(" error at rest: ") + kCauseNames.at(c), drive_force,
+               [c](const StandinPose& pose) { return pose.rest.errors.at(c); });
   }
   std::string csv;
-  for (const std::string& heading : headings) csv += (csv.empty() ? "" : ",") + CsvCell(heading);
-  csv += "\n";
+  for (const CsvColumn& column : columns) csv += CsvCell(column.heading) + ",";
+  csv.back() = '\n';
   for (const StandinPose& pose : result.poses) {
-    std::string row;
-    const auto number = [&](double value) {
-      row += std::isfinite(value) ? fmt::format("{:.17g},", value) : ",";
-    };
-    const auto numbers = [&](const VecX& values) {
-      for (size_t k = 0; k < n; ++k) number(values.size() > 0 ? values[Ix(k)] : kNan);
-    };
-    numbers(pose.q);
-    row += CsvCell(WordOf(pose.status)) + "," + CsvCell(pose.where) + ",";
-    numbers(pose.drives);
-    for (size_t d = 0; d < n; ++d) {
-      numbers(pose.J.size() > 0 ? VecX(pose.J.row(Ix(d)).transpose()) : VecX());
-    }
-    number(pose.least);
-    number(pose.largest);
-    number(pose.map_error);
-    number(pose.ways < 0 ? kNan : pose.ways);
-    number(pose.joint_poses < 0 ? kNan : pose.joint_poses);
-    for (const MatX* matrix : {&pose.M, &pose.R}) {
-      for (size_t i = 0; i < n; ++i) {
-        for (size_t j = 0; j <= i; ++j) number(matrix->size() > 0 ? (*matrix)(Ix(i), Ix(j)) : kNan);
-      }
-    }
-    numbers(pose.torque_alone);
-    numbers(pose.speed_alone);
-    for (const bool torque : {true, false}) {
-      if (!polygons[torque ? 0 : 1]) continue;
-      const auto corners = pose.status == PoseStatus::kUsable
-                               ? CornersAt(result, pose, torque)
-                               : std::vector<std::array<double, 2>>(2, {kNan, kNan});
-      for (size_t c = 0; c < 2; ++c) {
-        for (const double value : corners[c]) number(value);
-      }
-    }
-    numbers(pose.rest.full);
-    for (const VecX& error : pose.rest.errors) numbers(error);
-    row.back() = '\n';
-    csv += row;
+    for (const CsvColumn& column : columns) csv += column.cell(pose) + ",";
+    csv.back() = '\n';
   }
   return csv;
 }

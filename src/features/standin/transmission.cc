@@ -201,22 +201,16 @@ class TransmissionFinder {
                  hint);
   }
 
-  // Beyond its joint there is neither a loop nor a chosen joint.
+  // Its joint is neither in a loop nor on the way to a chosen joint.
   [[nodiscard]] bool EndsLoose(const Drive& drive) const {
     const auto* on = std::get_if<JointDrive>(&drive.kind);
     if (on == nullptr) return false;
-    const std::vector<int> beyond = BodiesBeyond(mechanism_, on->joint);
-    const auto is_beyond = [&](int body) { return std::ranges::count(beyond, body) > 0; };
-    for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
-      const Joint& joint = mechanism_.joints[j];
-      const bool inside = is_beyond(joint.parent), also = is_beyond(joint.child);
-      if (!inside && !also) continue;
-      if (joint.closure || (inside != also && static_cast<int>(j) != on->joint)) return false;
-      for (const NamedCoordinate& chosen : found_.joints) {
-        if (chosen.coordinate.index == static_cast<int>(j)) return false;
-      }
+    for (size_t b = 0; b < found_.kept.size(); ++b) {
+      if (found_.kept[b] && found_.toward_world[b] == on->joint) return false;
     }
-    return true;
+    return std::ranges::none_of(LoopGroups(mechanism_), [&](const LoopGroup& group) {
+      return std::ranges::count(group.joints, on->joint) > 0;
+    });
   }
 
   // Of drives too many, those stay at home that also move joints between the world and the chosen
@@ -528,7 +522,7 @@ class TransmissionFinder {
 };
 
 // Joints that move with the chosen ones: those of their loops, of the drives', and what couplings
-// and held lengths tie to these.
+// tie to these.
 std::vector<bool> MovingJoints(const Mechanism& mechanism, const Transmission& transmission) {
   std::vector<std::vector<int>> ties;
   for (const LoopGroup& group : LoopGroups(mechanism)) {
@@ -538,18 +532,6 @@ std::vector<bool> MovingJoints(const Mechanism& mechanism, const Transmission& t
   for (const Coupling& coupling : mechanism.couplings) {
     ties.emplace_back();
     for (const Coupling::Term& term : coupling.terms) ties.back().push_back(term.joint);
-  }
-  for (const Drive& drive : mechanism.drives) {
-    const auto* leg = std::get_if<DistanceDrive>(&drive.kind);
-    if (leg == nullptr) continue;
-    std::set<int> around;  // tree joints between its two bodies
-    for (size_t t = mechanism.tree_joints.size(); t-- > 0;) {
-      const std::vector<int> beyond = BodiesBeyond(mechanism, mechanism.tree_joints[t]);
-      const auto is_beyond = [&](int body) { return std::ranges::count(beyond, body) > 0; };
-      if (is_beyond(leg->body_from) != is_beyond(leg->body_to))
-        around.insert(mechanism.tree_joints[t]);
-    }
-    ties.emplace_back(around.begin(), around.end());
   }
   std::vector<bool> moving(mechanism.joints.size(), false);
   for (const NamedCoordinate& joint : transmission.joints) {
@@ -588,6 +570,10 @@ std::optional<Transmission> FindTransmission(const Mechanism& mechanism,
 }
 
 Mechanism MovingPart(const Mechanism& mechanism, const Transmission& transmission) {
+  // A held length may tie any two bodies.
+  for (const Drive& drive : mechanism.drives) {
+    if (std::holds_alternative<DistanceDrive>(drive.kind)) return mechanism;
+  }
   const std::vector<bool> moving = MovingJoints(mechanism, transmission);
   std::vector<int> body_at(mechanism.bodies.size(), -1);  // new index
   Mechanism part = mechanism;
@@ -641,11 +627,7 @@ Mechanism MovingPart(const Mechanism& mechanism, const Transmission& transmissio
     return joint->parent != joint->child;
   });
   const std::vector<int> drive_at = keep(&part.drives, [&](Drive* drive) {
-    if (auto* on = std::get_if<JointDrive>(&drive->kind)) return follow(joint_at, &on->joint);
-    auto& leg = std::get<DistanceDrive>(drive->kind);
-    move_point(&leg.body_from, &leg.p_from);
-    move_point(&leg.body_to, &leg.p_to);
-    return leg.body_from != leg.body_to;
+    return follow(joint_at, &std::get<JointDrive>(drive->kind).joint);
   });
   const std::vector<int> bushing_at = keep(&part.bushings, [&](Bushing* bushing) {
     move_pose(&bushing->parent, &bushing->X_PF);
