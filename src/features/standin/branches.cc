@@ -243,9 +243,9 @@ struct StandinBranches::Impl {
     return {limb.side * std::sqrt(root) - along};
   }
 
-  // (1) as left side less right side [m²]; of a direct drive [rad or m].
+  // (1) as left side less right side [m²]; of a direct drive a sine that is zero once in a turn.
   [[nodiscard]] double Off(const Limb& limb, const VecX& q, double m) const {
-    if (limb.kind == Limb::Kind::kDirect) return q[limb.joint] - m;
+    if (limb.kind == Limb::Kind::kDirect) return std::sin(0.5 * (q[limb.joint] - m));
     const Vec3 w = End(limb, q), along = limb.axis * (limb.sign * m);
     switch (limb.kind) {
       case Limb::Kind::kCrank:
@@ -294,10 +294,12 @@ struct StandinBranches::Impl {
       }
       return low;
     };
-    double t0 = -std::numbers::pi, f0 = f(t0);
+    // Symmetric mechanisms have zeros at 0 and half a turn, which are no steps.
+    constexpr double kFrom = 0.1234567;
+    double t0 = kFrom, f0 = f(t0);
     for (int i = 1; i <= kSteps; ++i) {
       double low = t0, f_low = f0;
-      const double t = kTurn * i / kSteps - std::numbers::pi, f_t = f(t);
+      const double t = kFrom + kTurn * i / kSteps, f_t = f(t);
       t0 = t;
       f0 = f_t;
       if (std::isnan(f_low) && std::isnan(f_t)) continue;

@@ -21,6 +21,7 @@ namespace {
 constexpr double kHalfRange = std::numbers::pi / 6.0;  // where neither user nor joint states one
 constexpr double kMostPoses = 200000.0;
 constexpr int kSamples = 400;    // of a period
+constexpr double kShort = 1e-3;  // [rad or m] of a dead centre, where the reference may stop
 constexpr size_t kCounted = 11;  // poses along a joint whose drives' joint poses are counted
 // Singular values below this share of the largest, there or at home, are round-off.
 constexpr double kRegular = 1e-9;
@@ -597,14 +598,21 @@ class StandinComputer {
       if (kind == Kind::kNone) good = bad;
       end.kind = kind;
     }
-    end.at = home + (up ? good : -good);
-    // The reference stops short of a dead centre.
-    constexpr double kShort = 1e-3;
-    q[joint] = home + (up ? 1.0 : -1.0) * (good + kShort * most);
+    const auto place = [&](double by) { return home + (up ? by : -by); };
+    end.at = place(good);
     if (end.kind != Kind::kOpen) return end;
+    // The reference stops short of a dead centre, which limbs have in closed form.
+    double reach = good, out = good + kShort;
+    for (int k = 0; k < 30; ++k) {
+      const double middle = 0.5 * (reach + out);
+      q[joint] = place(middle);
+      (OutOfReach(q).empty() ? reach : out) = middle;
+    }
+    q[joint] = place(out);
     if (const std::string drive = OutOfReach(q); !drive.empty()) {
       end.kind = Kind::kDeadCentre;
       end.where = drive;
+      end.at = place(reach);
       return end;
     }
     // Of limbs of other kinds: a drive whose rate by the joint's grows without bound.

@@ -182,8 +182,8 @@ class TransmissionFinder {
   bool RefusePassive(const std::vector<std::string>& passive) {
     if (mechanism_.drives.empty()) {
       return Error("the robot has no drive: what moves " + Joined(names_, kNamed) + " is not known",
-                   "name its motors: actuators in MJCF, name_mot in the closure file of a URDF, "
-                   "drives in a model.yaml");
+                   "name its motors: <actuator> in MJCF, name_mot or <transmission> with a URDF, a "
+                   "<plugin> in SDF, drives in a model.yaml");
     }
     std::string hint =
         Joined(passive, kNamed) + ": a drive, or fixed (joint_type of a closure file)";

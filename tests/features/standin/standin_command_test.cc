@@ -2,8 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "tests/support/json_schemas.h"
 #include "tests/support/run_program.h"
@@ -71,6 +74,107 @@ TEST_F(StandinCommand, NumbersOfMotorsFitTheSchema) {
       EXPECT_NE(schemas.Misfit(renamed), "") << limits << " " << key;
       EXPECT_NE(schemas.Misfit(typed), "") << limits << " " << key;
     }
+  }
+}
+
+// A scenario's motion and a table of the same: the built-in swing over ±30°, halved.
+TEST_F(StandinCommand, ComparesAlongMotions) {
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream(mbverify.folder() / name) << text;
+    return "--motion '" + (mbverify.folder() / name).string() + "' ";
+  };
+  const std::string walk = "mechanism: " + SourcePath("/tests/mechanisms/parallel_ankle.yaml") + R"(
+motion:
+  duration_s: 0.9975
+  sample_s: 0.0025
+  commands:
+    ankle.0: {sine: {amplitude_deg: 15, period_s: 1}}
+    ankle.1: {sine: {amplitude_deg: 15, period_s: 1, phase_deg: 90}}
+)";
+  const auto table = [](double amplitude_deg) {
+    std::string text = "time,ankle.1_deg,ankle.0 (rad)\n";
+    for (int k = 0; k < 400; ++k) {
+      const double phase = 2 * std::numbers::pi * k / 400;
+      text += fmt::format("{:.4f},{:.12f},{:.14f}\n", k / 400.0, amplitude_deg * std::cos(phase),
+                          amplitude_deg * std::numbers::pi / 180 * std::sin(phase));
+    }
+    return text;
+  };
+  const std::string joints = "--joints ankle.0,ankle.1 --resolution 3 --json - ";
+  const ProgramResult result =
+      Call(joints + write("walk.yaml", walk) + write("walk.csv", table(15)) +
+           write("longer.csv", table(15.1)));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(test::JsonSchemas().Misfit(json), "");
+  ASSERT_EQ(json["scenes"].size(), 6u);
+  const auto p95 = [&](size_t scene, size_t drive) {
+    return json["scenes"][scene]["drives"][drive]["errors"][4]["p95"].get<double>();
+  };
+  EXPECT_EQ(json["scenes"][2]["name"], "along walk");
+  EXPECT_EQ(json["scenes"][3]["name"], "along walk.csv");
+  for (const size_t drive : {size_t{0}, size_t{1}}) {
+    EXPECT_NEAR(p95(2, drive), p95(1, drive), 1e-9);
+    EXPECT_NEAR(p95(3, drive), p95(1, drive), 1e-4 * p95(1, drive));
+    EXPECT_GT(std::abs(p95(4, drive) - p95(1, drive)), 1e-3 * p95(1, drive));
+  }
+  EXPECT_THAT(json["verdict"].get<std::string>(), HasSubstr("along longer.csv"));
+  EXPECT_THAT(result.err, HasSubstr("ankle.1 -30°); along longer.csv"));
+  EXPECT_THAT(ReadAll(mbverify.folder() / "out/parallel_ankle/standin/standin.html"),
+              HasSubstr("; along longer.csv"));
+
+  const std::pair<std::string, std::string> cases[] = {
+      {write("no.csv", "time,hip\n0,1\n1,2\n"), "has no column for the position of 'ankle.0'"},
+      {write("few.csv", "time,ankle.0,ankle.1\n0,1,0\n1,2,0\n"), "has 2 rows"},
+      {"--motion nowhere.csv", "cannot be read"},
+      {"--motion four_bar/turn", "its model has no joint coordinate 'ankle.0'"}};
+  for (const auto& [options, message] : cases) {
+    const ProgramResult refused = Call(joints + options);
+    EXPECT_EQ(refused.exit_code, 2) << options;
+    EXPECT_THAT(refused.err, HasSubstr(message));
+  }
+}
+
+TEST_F(StandinCommand, ReadsUrdfAndSdf) {
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream(mbverify.folder() / name) << text;
+    return (mbverify.folder() / name).string();
+  };
+  std::string sdf = ReadAll(SourcePath("/tests/fuzz/seeds/sdf/linkage.sdf"));
+  const std::string end = "</model>";
+  sdf.insert(sdf.find(end), "<plugin name='c' filename='c'><joint_name>A</joint_name></plugin>");
+  const auto joint = [](const std::string& name, const std::string& links, const char* xyz) {
+    return fmt::format(
+        "<joint name='{}' type='continuous'>{}<origin xyz='{}'/><axis xyz='0 1 0'/></joint>", name,
+        links, xyz);
+  };
+  std::string urdf = "<robot name='linkage'><link name='base'/>";
+  for (const char* link : {"crank", "coupler", "rocker"}) {
+    urdf += fmt::format(
+        "<link name='{}'><inertial><origin xyz='0 0 0.1'/><mass value='1'/><inertia ixx='.01' "
+        "iyy='.01' izz='.01' ixy='0' ixz='0' iyz='0'/></inertial></link>",
+        link);
+  }
+  for (const auto& [frame, link, xyz] :
+       {std::tuple("c1", "coupler", "0.5 0 0"), {"c2", "rocker", "0 0 0.3"}}) {
+    urdf += fmt::format(
+        "<link name='{}'/><joint name='to_{}' type='fixed'><parent link='{}'/><child link='{}'/>"
+        "<origin xyz='{}'/></joint>",
+        frame, frame, link, frame, xyz);
+  }
+  urdf += joint("A", "<parent link='base'/><child link='crank'/>", "0 0 0") +
+          joint("B", "<parent link='crank'/><child link='coupler'/>", "0 0 0.3") +
+          joint("D", "<parent link='base'/><child link='rocker'/>", "0.5 0 0") + "</robot>";
+  write("linkage.yaml", "closed_loop: [[c1, c2]]\ntype: [3d]\nname_mot: [A]\n");
+  for (const std::string& file : {write("linkage.sdf", sdf), write("linkage.urdf", urdf)}) {
+    const ProgramResult result =
+        mbverify("standin '" + file + "' --joints D --resolution 5 --out '" + mbverify.Out() +
+                 "' --json - -q");
+    ASSERT_EQ(result.exit_code, 0) << file << result.err;
+    const auto json = nlohmann::json::parse(result.out);
+    EXPECT_NEAR(json["drives"][0]["ratio"][0].get<double>(), 1.0, 1e-9) << file;
+    EXPECT_EQ(json["branches"]["limbs"][0]["kind"], "crank and rod") << file;
+    EXPECT_THAT(json["verdict"].get<std::string>(), HasSubstr("a constant gear does"));
   }
 }
 
