@@ -228,6 +228,21 @@ TEST(StandinBranches, EndsOfJointsAloneAreDeadCentresAndTypeTwo) {
   for (int degrees = -66; degrees > -135; --degrees) {
     EXPECT_TRUE(newest.Ways(0, pose(0, degrees * kDegree)).empty()) << degrees;
   }
+  // A solver whose cosine is clamped where the rods do not reach has a zero there.
+  const auto clamped = [&](double degrees) {
+    const VecX q = pose(0, degrees * kDegree);
+    VecX m(2);
+    for (int limb = 0; limb < 2; ++limb) {
+      const double mean = 0.5 * (newest.Off(limb, q, 0) + newest.Off(limb, q, std::numbers::pi));
+      const double x = newest.Off(limb, q, 0) - mean,
+                   z = newest.Off(limb, q, 0.5 * std::numbers::pi) - mean;
+      const double cosine = -mean / std::hypot(x, z);
+      EXPECT_GT(std::abs(cosine), 1.0);
+      m[limb] = std::atan2(z, x) + std::acos(std::clamp(cosine, -1.0, 1.0));
+    }
+    return newest.ByJoints(q, m).determinant();
+  };
+  EXPECT_LT(clamped(-85.5) * clamped(-84.9), 0);
   ServoAnkle longer;
   longer.high_rod += 0.01;
   EXPECT_GT(std::abs(ends(longer)[0].at - now[0].at), 1e-5);
