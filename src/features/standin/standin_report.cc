@@ -36,6 +36,11 @@ std::string Percent(double share) {
 double InShownUnit(double value, const std::string& unit) {
   return unit == "rad" ? value * 180.0 / std::numbers::pi : 1000.0 * value;
 }
+// Of a position: round-off is no number.
+std::string Position(double value, const std::string& unit) {
+  const double shown = InShownUnit(value, unit);
+  return Short(std::abs(shown) < 1e-9 ? 0.0 : shown);
+}
 const char* ShownUnit(const std::string& unit) { return unit == "rad" ? "°" : "mm"; }
 std::string ForceUnitOf(const std::string& unit) { return unit == "rad" ? "N m" : "N"; }
 
@@ -44,7 +49,7 @@ std::string PlaceText(const StandinResult& result, const VecX& q) {
   std::vector<std::string> parts;
   for (size_t k = 0; k < result.joints.size(); ++k) {
     const std::string& unit = result.joint_units[k];
-    parts.push_back(fmt::format("{} {:.4g}{}{}", result.joints[k], InShownUnit(q[Ix(k)], unit),
+    parts.push_back(fmt::format("{} {}{}{}", result.joints[k], Position(q[Ix(k)], unit),
                                 unit == "rad" ? "" : " ", ShownUnit(unit)));
   }
   return Joined(parts);
@@ -200,8 +205,7 @@ Table ReachTable(const StandinResult& result) {
     const std::string& unit = result.joint_units[k];
     table.rows.push_back({result.joints[k], Short(InShownUnit(result.ranges[k].low, unit)),
                           Short(InShownUnit(result.ranges[k].high, unit)),
-                          Short(InShownUnit(result.home[Ix(k)], unit)), ShownUnit(unit),
-                          result.range_of[k]});
+                          Position(result.home[Ix(k)], unit), ShownUnit(unit), result.range_of[k]});
   }
   return table;
 }
@@ -298,9 +302,9 @@ Table LimbTable(const StandinResult& result) {
                           limb.kind.empty() ? "–"
                           : two             ? "2"
                                             : "1",
-                          Short(InShownUnit(result.drives_home[Ix(d)], unit)),
-                          Short(InShownUnit(limb.other_home, unit)),
-                          Short(InShownUnit(limb.apart, unit)), ShownUnit(unit),
+                          Position(result.drives_home[Ix(d)], unit),
+                          Position(limb.other_home, unit), Position(limb.apart, unit),
+                          ShownUnit(unit),
                           two ? PlaceText(result, result.poses[limb.apart_at].q) : "",
                           limb.kind.empty() ? "–" : std::to_string(limb.other_way)});
   }
@@ -318,7 +322,7 @@ Table HomePosesTable(const StandinResult& result) {
   for (const VecX& q : result.poses_at_home) {
     table.rows.emplace_back();
     for (size_t k = 0; k < result.joints.size(); ++k) {
-      table.rows.back().emplace_back(Short(InShownUnit(q[Ix(k)], result.joint_units[k])));
+      table.rows.back().emplace_back(Position(q[Ix(k)], result.joint_units[k]));
     }
   }
   return table;
