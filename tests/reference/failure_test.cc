@@ -33,6 +33,13 @@ TEST(ReferenceFailure, ARockerCommandedBeyondItsReachIsUnreachable) {
   const double nearest = std::min(std::abs(std::abs(reached) - angle_at(reach)),
                                   std::abs(std::abs(reached) - angle_at(far)));
   EXPECT_LT(nearest, 0.0101);
+  // The same without the search for what stays open.
+  const ReferenceRun brief =
+      RunReference(m, DriveMotion(m, {{{ConstantTerm{home}, RampTerm{1.0}}}}, 3.0, 0.01),
+                   {.explain_unreached = false});
+  EXPECT_EQ(brief.summary.stop, Stop::kUnreachable);
+  EXPECT_EQ(brief.summary.time_s, run.summary.time_s);
+  EXPECT_EQ(brief.summary.where, "");
 }
 
 TEST(ReferenceFailure, AFirstPoseOutOfReachIsReportedAtTimeZero) {

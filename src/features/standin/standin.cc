@@ -235,7 +235,9 @@ class StandinComputer {
       WalkGrid([this](StandinPose* pose) { Look(pose); }, 0.0, 0.4);
     } while (doubted_);
     if (result_.usable() == 0) {
-      Error("no pose of the range can be used: " + FirstTrouble(), "another --range");
+      const bool home = BeyondRange(result_.drives_home).empty();
+      Error("no pose of the range can be used: " + FirstTrouble(),
+            home ? "another --range" : "another home pose (guesses of the model)");
       return std::move(result_);
     }
     FitArmature();
@@ -629,6 +631,9 @@ class StandinComputer {
   }
 
   [[nodiscard]] std::string FirstTrouble() const {
+    if (const std::string drive = BeyondRange(result_.drives_home); !drive.empty()) {
+      return "at home already, " + drive + " is beyond its range";
+    }
     if (!trouble_.empty()) return trouble_;
     return result_.poses.front().where + ": " + WordOf(result_.poses.front().status);
   }

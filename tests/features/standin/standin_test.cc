@@ -724,7 +724,12 @@ TEST(Standin, RefusesWhatHasNoSerialModel) {
   EXPECT_THAT(text(ankle, kPitchRoll, {.ranges = {{"hip", 0.1, 0.2}}}), HasSubstr("not chosen"));
   EXPECT_THAT(text(ankle, kPitchRoll, {.ranges = {}, .resolution = 1000}), HasSubstr("too many"));
   EXPECT_THAT(text(Loaded(kKnee), {"knee"}, {.ranges = {{"knee", 130 * kDeg, 140 * kDeg}}}),
-              HasSubstr("no pose of the range can be used"));
+              HasSubstr("no pose of the range can be used: type 2"));
+  EXPECT_THAT(
+      text(Loaded(Changed(kKnee, {{"knee_motor: {kind: joint, joint: hinge",
+                                   "knee_motor: {kind: joint, joint: hinge, range: [2, 3]"}})),
+           {"knee"}),
+      HasSubstr("at home already, knee_motor is beyond its range"));
 }
 
 // A page's numbers are those of the result, and other ones where the result is another.
