@@ -325,20 +325,9 @@ StandinBranches::StandinBranches(const Mechanism& mechanism, const Transmission&
 StandinBranches::~StandinBranches() = default;
 
 std::string StandinBranches::KindOf(Eigen::Index drive) const {
-  switch (impl_->limbs[Nth(drive)].kind) {
-    case Limb::Kind::kDirect:
-      return "the joint itself";
-    case Limb::Kind::kCrank:
-      return "crank and rod";
-    case Limb::Kind::kSlider:
-      return "slider and rod";
-    case Limb::Kind::kCylinder:
-      return "cylinder";
-    case Limb::Kind::kDistance:
-      return "leg";
-    default:
-      return "";
-  }
+  constexpr std::array<const char*, 6> kKinds = {
+      "", "the joint itself", "crank and rod", "slider and rod", "cylinder", "leg"};
+  return kKinds.at(static_cast<size_t>(impl_->limbs[Nth(drive)].kind));
 }
 
 bool StandinBranches::Fits(Eigen::Index drive, const VecX& q, double m) const {

@@ -311,23 +311,6 @@ Table LimbTable(const StandinResult& result) {
   return table;
 }
 
-Table HomePosesTable(const StandinResult& result) {
-  Table table{.name = "standin_assemblies",
-              .caption = "Poses of the joints with the drives as at home, that of home first",
-              .columns = {}};
-  for (size_t k = 0; k < result.joints.size(); ++k) {
-    table.columns.push_back(
-        Digits(result.joints[k] + " [" + ShownUnit(result.joint_units[k]) + "]"));
-  }
-  for (const VecX& q : result.poses_at_home) {
-    table.rows.emplace_back();
-    for (size_t k = 0; k < result.joints.size(); ++k) {
-      table.rows.back().emplace_back(Position(q[Ix(k)], result.joint_units[k]));
-    }
-  }
-  return table;
-}
-
 Table LimitTable(const StandinResult& result, bool torque) {
   Table table{
       .name = torque ? "standin_torque" : "standin_speed",
@@ -576,8 +559,14 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
   counts.texts = {
       "positions of the drives that put the limbs together: " + CountsText(WaysOf(result)),
       "poses of the joints over a turn with the same drives: " + CountsText(JointPosesOf(result))};
+  if (!result.poses_at_home.empty()) {
+    std::string poses;
+    for (const VecX& q : result.poses_at_home) {
+      poses += (poses.empty() ? "" : "; ") + PlaceText(result, q);
+    }
+    counts.texts.push_back("with the drives as at home: " + poses);
+  }
   branches.Add(std::move(counts));
-  if (!result.poses_at_home.empty()) branches.Add(HomePosesTable(result));
   branches.Note(
       "At a dead centre (type 1) both ways of a limb meet, and beyond it the rod does not reach. A "
       "limb's ways follow from a rod's length in closed form, and hold where they give the drives "

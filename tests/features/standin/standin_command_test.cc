@@ -142,7 +142,10 @@ TEST_F(StandinCommand, ReadsUrdfAndSdf) {
   };
   std::string sdf = ReadAll(SourcePath("/tests/fuzz/seeds/sdf/linkage.sdf"));
   const std::string end = "</model>";
-  sdf.insert(sdf.find(end), "<plugin name='control' filename='gz-sim-joint-position-controller-system'><joint_name>A</joint_name></plugin>");
+  sdf.insert(
+      sdf.find(end),
+      "<plugin name='control' "
+      "filename='gz-sim-joint-position-controller-system'><joint_name>A</joint_name></plugin>");
   const auto joint = [](const std::string& name, const std::string& links, const char* xyz) {
     return fmt::format(
         "<joint name='{}' type='continuous'>{}<origin xyz='{}'/><axis xyz='0 1 0'/></joint>", name,
