@@ -157,6 +157,8 @@ int WriteWholeFile(const std::string& path, const std::string& content,
   return trouble.empty() ? 0 : NotWritten(trouble, "");
 }
 
+namespace {
+
 std::optional<NamedRange> ReadNamedRange(
     const std::string& text, const std::vector<std::string>& names,
     const std::function<std::string(const std::string&)>& unit_of) {
@@ -189,6 +191,24 @@ std::optional<NamedRange> ReadNamedRange(
                   unit == "rad" ? "NAME=… in rad or NAME_deg=…" : "NAME=… in m or NAME_mm=…");
   }
   return range;
+}
+
+}  // namespace
+
+std::optional<std::vector<NamedRange>> ReadNamedRanges(
+    const std::vector<std::string>& texts, const std::vector<std::string>& names,
+    const std::function<std::string(const std::string&)>& unit_of) {
+  std::vector<NamedRange> ranges;
+  for (const std::string& text : texts) {
+    const std::optional<NamedRange> range = ReadNamedRange(text, names, unit_of);
+    if (!range) return std::nullopt;
+    if (std::ranges::find(ranges, range->name, &NamedRange::name) != ranges.end()) {
+      (void)Refuse("--range of '" + range->name + "' is stated twice", "each coordinate once");
+      return std::nullopt;
+    }
+    ranges.push_back(*range);
+  }
+  return ranges;
 }
 
 std::optional<std::string> FindModelOrRefuse(const std::string& model) {

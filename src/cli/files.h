@@ -61,10 +61,10 @@ struct NamedRange {
   std::string name;
   double low = 0.0, high = 0.0;
 };
-/// "pitch_deg=-50:30", where `names` are known and `unit_of` says "m" or "rad"; empty after a
-/// message. A name that is not known is taken as it is.
-[[nodiscard]] std::optional<NamedRange> ReadNamedRange(
-    const std::string& text, const std::vector<std::string>& names,
+/// "pitch_deg=-50:30" of the options --range, where `names` are known and `unit_of` says "m" or
+/// "rad" ("": any); empty after a message. A name that is not known is taken as it is.
+[[nodiscard]] std::optional<std::vector<NamedRange>> ReadNamedRanges(
+    const std::vector<std::string>& texts, const std::vector<std::string>& names,
     const std::function<std::string(const std::string&)>& unit_of);
 
 /// Writes a file whole or not at all (see WriteFile in base/files.h), but not over one of `inputs`

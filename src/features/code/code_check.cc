@@ -521,8 +521,13 @@ std::string CodeCheck::Slip(CodeReference* reference) const {
   for (Eigen::Index k = 0; k < m; ++k) {
     positions_right = positions_right && close(series(false, true, k), series(false, false, k));
   }
-  if (std::string slip = of_outputs(positions_right); !slip.empty()) return slip;
-  if (positions_right) return "";
+  std::string slip = of_outputs(positions_right);
+  if (positions_right) return slip;
+  // On a symmetric mechanism a slip of the coordinates looks like one of the actuators.
+  const auto also = [&slip](const std::string& other) {
+    slip += (slip.empty() ? "" : "; or: ") + other;
+    return slip;
+  };
   // The coordinates taken otherwise.
   const size_t n = formulas_.size();
   const auto taken = [&](const std::function<void(VecX*)>& change) {
@@ -544,19 +549,21 @@ std::string CodeCheck::Slip(CodeReference* reference) const {
     for (size_t l = 0; l < k; ++l) {
       const auto other = static_cast<Eigen::Index>(l);
       if (taken([&](VecX* q) { std::swap((*q)[at], (*q)[other]); })) {
-        return fmt::format("the coordinates {} and {} are exchanged", coordinate(l), coordinate(k));
+        return also(
+            fmt::format("the coordinates {} and {} are exchanged", coordinate(l), coordinate(k)));
       }
     }
     if (taken([&](VecX* q) { (*q)[at] *= -1.0; })) {
-      return fmt::format("the coordinate {} has the other sign", coordinate(k));
+      return also(fmt::format("the coordinate {} has the other sign", coordinate(k)));
     }
   }
   for (const double factor : {kHalfTurn / M_PI, M_PI / kHalfTurn}) {
     if (taken([&](VecX* q) { *q *= factor; })) {
-      return factor < 1.0 ? "the coordinates are taken as degrees"
-                          : "the coordinates are turned into degrees";
+      return also(factor < 1.0 ? "the coordinates are taken as degrees"
+                               : "the coordinates are turned into degrees");
     }
   }
+  if (!slip.empty()) return slip;
   for (const size_t i : both) {
     if (close(found_[i].actuators, states_[i].actuators)) continue;
     if (ClosesOtherwise(states_[i].q, found_[i].actuators)) {

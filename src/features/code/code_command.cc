@@ -48,15 +48,14 @@ int Code(CodeArguments arguments) {
   SayText(stderr, found.Text());
   if (!task) return 2;
   CodeSettings& settings = arguments.settings;
-  for (const std::string& text : arguments.ranges) {
-    const auto range =
-        ReadNamedRange(text, NamesOf(task->coordinates), [&](const std::string& name) {
-          return CoordinateUnit(
-              mechanism,
-              std::ranges::find(task->coordinates, name, &NamedCoordinate::name)->coordinate);
-        });
-    if (!range) return 2;
-    settings.ranges.push_back({range->name, range->low, range->high});
+  const auto ranges = ReadNamedRanges(
+      arguments.ranges, NamesOf(task->coordinates), [&](const std::string& name) -> std::string {
+        const auto at = std::ranges::find(task->coordinates, name, &NamedCoordinate::name);
+        return at == task->coordinates.end() ? "" : CoordinateUnit(mechanism, at->coordinate);
+      });
+  if (!ranges) return 2;
+  for (const NamedRange& range : *ranges) {
+    settings.ranges.push_back({range.name, range.low, range.high});
   }
   settings.compile = !arguments.no_test;
   settings.origin = arguments.model;

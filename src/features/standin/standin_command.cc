@@ -197,45 +197,6 @@ bool ReadMotions(const std::vector<std::string>& motions, const std::vector<std:
   return !diagnostics.has_errors();
 }
 
-// "pitch_deg=-50:30".
-bool ReadRange(const std::string& text, const Mechanism& mechanism,
-               const std::vector<std::string>& joints, StandinSettings* settings) {
-  const auto assigned = SplitSet(text);
-  const size_t colon = assigned ? assigned->second.find(':') : std::string::npos;
-  if (colon == std::string::npos) {
-    (void)Refuse("--range " + text + " is not JOINT=LOW:HIGH", "for instance pitch_deg=-50:30");
-    return false;
-  }
-  const NameInUnit named =
-      SplitUnit(assigned->first, [&](const std::string& name) { return Contains(joints, name); });
-  const auto number = [&](const std::string& word) {
-    char* end = nullptr;
-    const double value = std::strtod(word.c_str(), &end);
-    return word.empty() || *end != '\0' || !std::isfinite(value) ? kNan : named.unit.to_si(value);
-  };
-  const StandinRange range{.joint = named.name,
-                           .low = number(assigned->second.substr(0, colon)),
-                           .high = number(assigned->second.substr(colon + 1))};
-  if (std::isnan(range.low) || std::isnan(range.high)) {
-    (void)Refuse("--range " + text + ": two numbers are needed", "for instance pitch_deg=-50:30");
-    return false;
-  }
-  for (const NamedCoordinate& joint : NamedJointCoordinates(mechanism)) {
-    const std::string unit = CoordinateUnit(mechanism, joint.coordinate);
-    if (joint.name != range.joint || named.unit.Suits(unit)) continue;
-    (void)Refuse("--range " + text + ": the joint's coordinate is in " + unit,
-                 unit == "rad" ? "NAME=… in rad or NAME_deg=…" : "NAME=… in m or NAME_mm=…");
-    return false;
-  }
-  for (const StandinRange& other : settings->ranges) {
-    if (other.joint != range.joint) continue;
-    (void)Refuse("--range of '" + range.joint + "' is stated twice", "each joint once");
-    return false;
-  }
-  settings->ranges.push_back(range);
-  return true;
-}
-
 int Standin(const StandinArguments& arguments) {
   const auto file = FindModelOrRefuse(arguments.model);
   if (!file) return 2;
@@ -250,8 +211,15 @@ int Standin(const StandinArguments& arguments) {
   AddMotorsOfJoints(loaded.motors_of_joints, &*loaded.mechanism);
   const Mechanism& mechanism = *loaded.mechanism;
   StandinSettings settings = arguments.settings;
-  for (const std::string& range : arguments.ranges) {
-    if (!ReadRange(range, mechanism, arguments.joints, &settings)) return 2;
+  const std::vector<NamedCoordinate> known = NamedJointCoordinates(mechanism);
+  const auto ranges =
+      ReadNamedRanges(arguments.ranges, arguments.joints, [&](const std::string& name) -> std::string {
+        const auto at = std::ranges::find(known, name, &NamedCoordinate::name);
+        return at == known.end() ? "" : CoordinateUnit(mechanism, at->coordinate);
+      });
+  if (!ranges) return 2;
+  for (const NamedRange& range : *ranges) {
+    settings.ranges.push_back({range.name, range.low, range.high});
   }
   if (!ReadMotions(arguments.motions, arguments.joints, mechanism, &settings)) return 2;
   ProgressLine line(!arguments.quiet);
