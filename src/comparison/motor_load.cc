@@ -9,6 +9,7 @@ namespace mbv {
 namespace {
 
 constexpr double kMoving = 0.01;  // of the largest speed
+constexpr double kNone = 1e-9;    // of the largest torque
 
 // ∫ f dt by the trapezoidal rule.
 template <typename F>
@@ -37,6 +38,11 @@ double WorstTorque(const Motor& motor, const ForceBand& force, double velocity,
                    double acceleration) {
   const double low = TorqueOf(motor, force.lower(), velocity, acceleration);
   const double high = TorqueOf(motor, force.upper(), velocity, acceleration);
+  if (HasSides(motor)) {
+    const double speed = motor.gear_ratio * velocity;
+    const double of_low = PeakShare(motor, low, speed), of_high = PeakShare(motor, high, speed);
+    if (of_low != of_high) return of_low > of_high ? low : high;
+  }
   return std::abs(low) > std::abs(high) ? low : high;
 }
 
@@ -115,14 +121,18 @@ class Meter {
 
   // The peak curve at each sample's own speed.
   void AddPeak() {
-    if (std::isinf(motor_.peak) && motor_.peak_curve.empty()) return;
+    if (std::isinf(motor_.peak) && motor_.peak_curve.empty() && !HasSides(motor_)) return;
     MotorLoad::Use use{.of = "peak", .use = 0.0};
+    // A motor of one side is not asked for round-off of the other.
+    const double none = HasSides(motor_) ? kNone * std::abs(load_.peak_torque) : 0.0;
     for (size_t i = 0; i < load_.time_s.size(); ++i) {
-      const double share = Share(std::abs(Torque(i)), PeakTorque(motor_, Speed(i)));
+      if (std::abs(Torque(i)) < none) continue;
+      const double share = PeakShare(motor_, Torque(i), Speed(i));
       if (!(share > use.use)) continue;
       use.use = share;
       use.time_s = load_.time_s[i];
     }
+    if (HasSides(motor_) && std::isinf(use.use)) use.of = "peak, none on this side";
     load_.uses.push_back(use);
   }
 

@@ -108,6 +108,7 @@ class Writer {
     if (joint.kind == JointKind::kUniversal) json["axis2"] = VectorJson(joint.axis2);
     json["home"] = std::move(home);
     json["range"] = std::move(range);
+    if (std::isfinite(joint.max_rotation)) json["max_rotation"] = joint.max_rotation;
     json["closure"] = joint.closure;
     json["transmits"] = joint.transmits_force_only ? "force" : "all";
     return json;

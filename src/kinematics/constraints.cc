@@ -328,6 +328,22 @@ double Later(const ScalarRow& row, const BodyStates& states, double dt_s) {
 
 }  // namespace
 
+namespace {
+
+// (1) of ForceElement.
+ScalarRow BallRow(const Joint& joint, int coordinate, const BodyStates& states) {
+  const auto p = static_cast<size_t>(joint.parent), c = static_cast<size_t>(joint.child);
+  const Vec3 a =
+      states.X_WB[c].linear() * joint.X_CM.linear().col(BallAxis(joint.kind, coordinate));
+  const Vec3 w_P = states.V_WB[p].head<3>(), w_C = states.V_WB[c].head<3>();
+  ScalarRow row{.parent = joint.parent, .child = joint.child, .bias = a.dot(w_C.cross(w_P))};
+  row.J_parent.head<3>() = -a;
+  row.J_child.head<3>() = a;
+  return row;
+}
+
+}  // namespace
+
 ScalarRow ElementRow(const Mechanism& mechanism, size_t e, const BodyStates& states) {
   const ForceElement& element = mechanism.elements[e];
   if (element.drive >= 0) {
@@ -338,6 +354,7 @@ ScalarRow ElementRow(const Mechanism& mechanism, size_t e, const BodyStates& sta
                       states);
   }
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  if (IsOfBall(joint.kind, element.coordinate)) return BallRow(joint, element.coordinate, states);
   const double near =
       states.turns.empty() ? joint.home[static_cast<size_t>(element.coordinate)] : states.turns[e];
   return JointCoordinateRow(joint, element.coordinate, states, near);

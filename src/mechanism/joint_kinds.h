@@ -106,6 +106,17 @@ static_assert(JointKindRowsAreInOrder());
          RowOf(kind).coordinates[static_cast<std::size_t>(coordinate)] == 'b';
 }
 
+/// The first coordinate of a ball's, or -1.
+[[nodiscard]] constexpr int FirstOfBall(JointKind kind) {
+  const std::size_t at = RowOf(kind).coordinates.find('b');
+  return at == std::string_view::npos ? -1 : static_cast<int>(at);
+}
+
+/// Which of M's axes an element on a ball's coordinate is about: 0, 1, 2.
+[[nodiscard]] constexpr int BallAxis(JointKind kind, int coordinate) {
+  return coordinate - FirstOfBall(kind);
+}
+
 /// True where an engine has a coordinate of its own for it: not for those of a ball, nor for a free
 /// joint's, which move together.
 [[nodiscard]] constexpr bool IsScalar(JointKind kind, int coordinate) {

@@ -38,6 +38,21 @@ double PeakTorque(const Motor& motor, double speed) {
   return TorqueAt(motor.peak_curve, motor.peak, motor.max_speed, std::abs(speed));
 }
 
+bool HasSides(const Motor& motor) {
+  return std::isfinite(motor.least) || std::isfinite(motor.most);
+}
+
+double PeakShare(const Motor& motor, double torque, double speed) {
+  const auto share = [](double used, double limit) {
+    if (used <= 0.0) return 0.0;
+    return limit > 0.0 ? used / limit : std::numeric_limits<double>::infinity();
+  };
+  const double of_both = share(std::abs(torque), PeakTorque(motor, speed));
+  if (torque < motor.least && motor.least > 0.0) return share(1.0, 0.0);
+  if (torque > motor.most && motor.most < 0.0) return share(1.0, 0.0);
+  return std::max({of_both, share(torque, motor.most), share(-torque, -motor.least)});
+}
+
 namespace {
 
 template <typename T>
@@ -135,6 +150,19 @@ bool ActsOnLength(const Mechanism& mechanism, const ForceElement& element) {
          IsLength(mechanism.joints[static_cast<size_t>(element.joint)].kind, element.coordinate);
 }
 
+bool ActsOnBall(const Mechanism& mechanism, const ForceElement& element) {
+  return element.joint >= 0 &&
+         IsOfBall(mechanism.joints[static_cast<size_t>(element.joint)].kind, element.coordinate);
+}
+
+void AddOfBall(const ForceElement& element, JointKind kind, std::vector<ForceElement>* elements) {
+  for (int axis = 0; axis < 3; ++axis) {
+    elements->push_back(element);
+    elements->back().name += std::array{".x", ".y", ".z"}.at(static_cast<size_t>(axis));
+    elements->back().coordinate = FirstOfBall(kind) + axis;
+  }
+}
+
 double RestRate(const Mechanism& mechanism, const ForceElement& element, double duration_s) {
   constexpr double kRest = 1e-6;
   return kRest * (ActsOnLength(mechanism, element) ? CharacteristicLength(mechanism) : 1.0) /
@@ -179,6 +207,8 @@ std::string Described(const Mechanism& mechanism, const ForceElement& element) {
     return word + " of drive '" + mechanism.drives[static_cast<size_t>(element.drive)].name + "'";
   }
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  if (ActsOnBall(mechanism, element))
+    return word + " of the rotation of joint '" + joint.name + "'";
   const std::string of =
       DofsOf(joint.kind) == 1 ? "" : "coordinate " + std::to_string(element.coordinate) + " of ";
   return word + " of " + of + "joint '" + joint.name + "'";

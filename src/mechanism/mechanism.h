@@ -26,8 +26,9 @@
 //   τ_m = F/(n η) where the motor drives, F v >= 0;  η F/n where it brakes                  (2)
 //         + J_r n v̇                                                                         (3)
 //
-// Limits are symmetric: they hold for magnitudes of speed and torque. A motor that turns has rad/s
-// and N m, one that slides has m/s and N ("torque" and "speed" below stand for both).
+// Limits are symmetric: they hold for magnitudes of speed and torque, but for `least` and `most`,
+// which have the sign of τ_m. A motor that turns has rad/s and N m, one that slides has m/s and N
+// ("torque" and "speed" below stand for both).
 
 namespace mbv {
 
@@ -43,6 +44,8 @@ struct Motor {
   bool turns = true;              ///< else it slides
   double continuous = kNoLimit;   ///< torque that it can bear for ever (RMS)
   double peak = kNoLimit;         ///< torque that it can give for short
+  double least = -kNoLimit;       ///< torque that it can give for short, with its sign: at a cable,
+  double most = kNoLimit;         ///< which pulls only, one of both is 0; least < most
   double rated_speed = kNoLimit;  ///< up to it, `continuous` may be used
   double max_speed = kNoLimit;    ///< never faster
   double rotor_inertia = 0.0;     ///< J_r [kg m²], or mass of the slider [kg]
@@ -64,6 +67,11 @@ struct Motor {
 /// constant up to its highest speed, and zero beyond.
 [[nodiscard]] double ContinuousTorque(const Motor& motor, double speed);
 [[nodiscard]] double PeakTorque(const Motor& motor, double speed);
+/// Whether `least` or `most` is a limit.
+[[nodiscard]] bool HasSides(const Motor& motor);
+/// Share of the motor's peak torque that a torque is, of the side on which it lies: infinite where
+/// the motor gives none there.
+[[nodiscard]] double PeakShare(const Motor& motor, double torque, double speed);
 
 // What verdicts on a model name, whatever the witnesses say: exceptions to the loader's rules that
 // the model allows, and what its source has and it has not.
@@ -194,7 +202,9 @@ struct Joint {
   std::array<double, 6> guess{};         ///< coordinates to start the home solution from
   std::array<double, 6> home{};          ///< coordinates at the solved home pose
   std::array<CoordinateRange, 6> range;  ///< limits, for reports and range checks
-  bool closure = false;                  ///< true: cut by the spanning tree (a loop closure)
+  /// Limit of a spherical joint's rotation angle, |log R_FM| [rad], for the same.
+  double max_rotation = std::numeric_limits<double>::infinity();
+  bool closure = false;  ///< true: cut by the spanning tree (a loop closure)
   /// Isostatic rule: this revolute/universal joint transmits a force only (as a ball would), which
   /// makes the reactions of an overconstrained loop definite. Kinematics of the mechanism must not
   /// change by it; the loader checks that by rank.
@@ -349,6 +359,13 @@ struct Contact {
 /// What acts along one scalar coordinate q of a joint or a bushing or along the length q of a
 /// distance drive; its force is positive as a drive's there, exerted by the joint's parent on its
 /// child. Parts of the reactions are these forces no more than drive forces are.
+///
+/// A ball's rotation has no coordinates to act along: its three elements, of one law, have the
+/// relative angular velocity about M's axes as rates (ActsOnBall()), and no position. With ω_FM of
+/// M seen from F, a_k M's axes and ω_C, ω_P the bodies' angular velocities
+///   q̇_k = a_k·ω_FM,  q̈_k = a_k·(ω̇_C − ω̇_P + ω_C × ω_P)                                         (1)
+/// so that damping is the moment −c ω_FM, and a rotor (MuJoCo's armature) −J dω_FM/dt as M or F see
+/// it; friction is limited about each axis by itself.
 struct ForceElement {
   std::string name;
   int joint = -1, coordinate = 0;  ///< the coordinate, or …
@@ -428,6 +445,10 @@ struct SignalSheet {
 [[nodiscard]] const char* WordOf(const ForceElement& element);
 /// True if an element's coordinate is a length, false if it is an angle.
 [[nodiscard]] bool ActsOnLength(const Mechanism& mechanism, const ForceElement& element);
+/// True for the elements of a ball's rotation.
+[[nodiscard]] bool ActsOnBall(const Mechanism& mechanism, const ForceElement& element);
+/// Adds the three of a ball's rotation, NAME.x, NAME.y, NAME.z, of a joint of this kind.
+void AddOfBall(const ForceElement& element, JointKind kind, std::vector<ForceElement>* elements);
 /// "rotor of joint 'hip'", for messages; with the coordinate's number where there are several.
 [[nodiscard]] std::string Described(const Mechanism& mechanism, const ForceElement& element);
 /// Rate of the coordinate of an element up to which it counts as at rest in a motion of this

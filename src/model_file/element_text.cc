@@ -37,6 +37,17 @@ std::string CoordinateText(int coordinate) {
   return coordinate == 0 ? "" : fmt::format(", coordinate: {}", coordinate);
 }
 
+bool IsFurtherOfBall(const Mechanism& mechanism, const ForceElement& element) {
+  if (!ActsOnBall(mechanism, element)) return false;
+  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  return BallAxis(joint.kind, element.coordinate) > 0;
+}
+
+std::string FileName(const Mechanism& mechanism, const ForceElement& element) {
+  return element.name.substr(
+      0, ActsOnBall(mechanism, element) ? element.name.rfind('.') : std::string::npos);
+}
+
 std::string ElementText(const ForceElement& element, const std::string& place, bool slides) {
   const auto* friction = std::get_if<FrictionLaw>(&element.law);
   const bool journal = friction != nullptr && friction->per_load() > 0.0 && !slides;

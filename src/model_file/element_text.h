@@ -13,6 +13,11 @@ namespace mbv {
 using TermNames = std::function<std::pair<std::string, int>(const Coupling::Term&)>;
 /// ", coordinate: 1" behind a joint's name, empty for the first coordinate.
 [[nodiscard]] std::string CoordinateText(int coordinate);
+/// The same of a ball's rotation, whose three elements are one in a file: only its first is
+/// written, by the name that they share.
+inline constexpr const char* kRotationText = ", coordinate: rotation";
+[[nodiscard]] bool IsFurtherOfBall(const Mechanism& mechanism, const ForceElement& element);
+[[nodiscard]] std::string FileName(const Mechanism& mechanism, const ForceElement& element);
 /// The lines of a force element as a model file's map, without braces: "kind: damping, …". `place`:
 /// "joint: …, coordinate: …" or "drive: …". `slides`: its coordinate is a length.
 [[nodiscard]] std::string ElementText(const ForceElement& element, const std::string& place,

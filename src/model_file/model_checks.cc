@@ -12,6 +12,8 @@
 #include "kinematics/constraints.h"
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
+#include "math/spatial.h"
+#include "mechanism/joint_pose.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/reach.h"
 #include "model_file/yaml/units.h"
@@ -237,6 +239,13 @@ void CheckHome(const Mechanism& mechanism, ModelReport* report) {
           fmt::format("joint '{}' is at {:.6g} at home, its range is {:.6g} … {:.6g}", joint.name,
                       joint.home[k], joint.range[k].lower, joint.range[k].upper));
     }
+    const double angle = LogRotation(JointPose(joint, joint.home).linear()).norm();
+    if (report->places().joints[j].line == 0 || !outside(angle, {0.0, joint.max_rotation}, false)) {
+      continue;
+    }
+    report->AtJoint(j, Severity::kWarning,
+                    fmt::format("joint '{}' is turned by {:.6g} at home, its range ends at {:.6g}",
+                                joint.name, angle, joint.max_rotation));
   }
   BodyStates states;
   states.Resize(mechanism.bodies.size());

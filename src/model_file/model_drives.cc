@@ -541,6 +541,11 @@ class MotorReader {
   void ReadLimits() {
     Positive("continuous", {kPlain}, &motor_.continuous);
     Positive("peak", {kPlain}, &motor_.peak);
+    if (const YamlNode* range = map_.Find("peak_range")) {
+      const auto sides = values_.Range(model_, *range, map_.PathOf("peak_range"), {kPlain});
+      failed_ = failed_ || !sides;
+      if (sides) motor_.least = sides->lower, motor_.most = sides->upper;
+    }
     Positive("rated_speed", {kPlain, kRpm}, &motor_.rated_speed);
     Positive("max_speed", {kPlain, kRpm}, &motor_.max_speed);
   }
@@ -626,6 +631,7 @@ class MotorReader {
 const std::vector<std::string> kMotorKeys = {"kind",
                                              "continuous",
                                              "peak",
+                                             "peak_range",
                                              "rated_speed",
                                              "rated_speed_rpm",
                                              "max_speed",
@@ -662,6 +668,10 @@ std::string MotorText(const Motor& motor) {
   };
   add("continuous", motor.continuous);
   add("peak", motor.peak);
+  const auto side = [](double x) { return std::isfinite(x) ? fmt::format("{}", x) : "null"; };
+  if (HasSides(motor)) {
+    text += fmt::format(", peak_range: [{}, {}]", side(motor.least), side(motor.most));
+  }
   add("rated_speed", motor.rated_speed);
   add("max_speed", motor.max_speed);
   add("rotor_inertia", motor.rotor_inertia);

@@ -54,9 +54,33 @@ void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
   if (kind->text == "bushing") return ReadBushing(block, map, block.prefix + entry.key);
   ForceElement element{.name = block.prefix + entry.key, .law = {}};
   const bool placed = ReadPlace(block, map, &element);
-  if (ReadLaw(block, map, kind->text, placed ? &element : nullptr) && placed) {
+  const JointKind on =
+      placed && element.joint >= 0 ? joints_.joints[element.joint].kind : JointKind::kFixed;
+  const bool turns_a_ball = IsOfBall(on, element.coordinate);
+  if (turns_a_ball && !SuitsBall(map, *kind)) return;
+  if (!ReadLaw(block, map, kind->text, placed ? &element : nullptr) || !placed) return;
+  if (turns_a_ball) {
+    AddOfBall(element, on, &elements_);
+  } else {
     elements_.push_back(std::move(element));
   }
+}
+
+bool ElementReader::SuitsBall(const YamlMap& map, const YamlNode& kind) {
+  YamlReader& yaml = values_.yaml();
+  if (kind.text == "spring") {
+    yaml.Error(kind, fmt::format("{}: a ball's rotation has no position for a spring", map.path()),
+               "kind: bushing, with the joint's frames and stiffness: [0, 0, 0, k, k, k]");
+    return false;
+  }
+  for (const char* key : {"gyroscopic", "axis_on", "axis"}) {
+    if (!map.Has(key)) continue;
+    yaml.Error(*map.Find(key),
+               fmt::format("{}: a ball's rotation has no axis for a rotor", map.PathOf(key)),
+               "inertia and ratio alone count for rotations about all axes");
+    return false;
+  }
+  return true;
 }
 
 bool ElementReader::ReadPlace(const Block& block, const YamlMap& map, ForceElement* element) {
@@ -67,10 +91,27 @@ bool ElementReader::ReadPlace(const Block& block, const YamlMap& map, ForceEleme
     return false;
   }
   if (map.Has("drive")) return ReadDrive(block, map, element);
+  if (TakeRotation(block, map, element)) return true;
   const auto at = ReadJointCoordinate(joints_, block, map, {}, &yaml);
   if (!at) return false;
   element->joint = at->joint;
   element->coordinate = at->coordinate;
+  return true;
+}
+
+// All axes of a ball: `coordinate: rotation`, of a spherical joint also without it.
+bool ElementReader::TakeRotation(const Block& block, const YamlMap& map, ForceElement* element) {
+  const YamlNode* coordinate = map.Find("coordinate");
+  if (coordinate != nullptr && coordinate->text != "rotation") return false;
+  int joint = -1;
+  for (const std::string& level : block.levels) {
+    if (joint < 0) joint = joints_.Find(level + map.Find("joint")->text);
+  }
+  if (joint < 0 || !HasBall(joints_.joints[joint].kind)) return false;
+  const JointKind kind = joints_.joints[joint].kind;
+  if (coordinate == nullptr && kind != JointKind::kSpherical) return false;
+  element->joint = joint;
+  element->coordinate = FirstOfBall(kind);
   return true;
 }
 

@@ -36,6 +36,8 @@ class ElementReader {
   void ReadElement(const Block& block, const YamlEntry& entry);
   bool ReadPlace(const Block& block, const YamlMap& map, ForceElement* element);
   bool ReadDrive(const Block& block, const YamlMap& map, ForceElement* element);
+  bool TakeRotation(const Block& block, const YamlMap& map, ForceElement* element);
+  bool SuitsBall(const YamlMap& map, const YamlNode& kind);
   bool ReadLaw(const Block& block, const YamlMap& map, const std::string& kind,
                ForceElement* element);
   std::optional<DampingLaw> ReadDamping(const Block& block, const YamlMap& map);

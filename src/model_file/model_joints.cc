@@ -210,6 +210,9 @@ void JointReader::ReadRange(const Block& block, const YamlMap& map, Joint* joint
   const int n = DofsOf(joint->kind);
   const bool one_pair = n == 1 && range.node->is_sequence() && !range.node->items.empty() &&
                         !range.node->items.front()->is_sequence();
+  const bool of_ball = joint->kind == JointKind::kSpherical && range.node->items.size() == 2 &&
+                       !range.node->items.front()->is_sequence();
+  if (of_ball) return ReadRotationRange(block, *range.node, path, range.unit, joint);
   if (one_pair) {
     joint->range[0] = values_.Range(block, *range.node, path, UnitOf(range.unit, joint->kind, 0))
                           .value_or(CoordinateRange{});
@@ -223,6 +226,20 @@ void JointReader::ReadRange(const Block& block, const YamlMap& map, Joint* joint
                                  UnitOf(range.unit, joint->kind, k))
                           .value_or(CoordinateRange{});
   }
+}
+
+// [0, the largest angle], about any axis.
+void JointReader::ReadRotationRange(const Block& block, const YamlNode& node,
+                                    const std::string& path, const UnitSuffix& unit, Joint* joint) {
+  const auto range = values_.Range(block, node, path, UnitOf(unit, joint->kind, 0));
+  if (!range) return;
+  if (range->lower == 0.0 && range->upper > 0.0) {
+    joint->max_rotation = range->upper;
+    return;
+  }
+  values_.yaml().Error(
+      node, fmt::format("{}: the range of a ball's rotation begins at 0", path),
+      "[0, the largest angle about any axis], or three ranges of roll, pitch, yaw");
 }
 
 bool JointReader::ReadFreeChoices(const YamlMap& map, Joint* joint) {

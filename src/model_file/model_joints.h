@@ -44,6 +44,8 @@ class JointReader {
                        Joint* joint);
   bool ReadAxes(const Block& block, const YamlMap& map, Joint* joint);
   void ReadRange(const Block& block, const YamlMap& map, Joint* joint);
+  void ReadRotationRange(const Block& block, const YamlNode& node, const std::string& path,
+                         const UnitSuffix& unit, Joint* joint);
   bool ReadFreeChoices(const YamlMap& map, Joint* joint);
   std::optional<double> ReadLead(const Block& block, const YamlMap& map, bool helical);
 

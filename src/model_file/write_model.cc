@@ -215,6 +215,9 @@ class ModelWriter {
     std::string text;
     if (n == 1) text = ", guess: " + guess + (limited ? ", range: " + range : "");
     if (n > 1) text = ", guess: [" + guess + "]" + (limited ? ", range: [" + range + "]" : "");
+    if (std::isfinite(joint.max_rotation)) {
+      text += fmt::format(", range: [0, {}]", joint.max_rotation);
+    }
     return text;
   }
 
@@ -276,9 +279,9 @@ class ModelWriter {
     if (!m_.elements.empty()) text += "elements:\n";
     for (size_t b = 0; b < m_.bushings.size(); ++b) text += Written(b, &taken);
     for (const ForceElement& element : m_.elements) {
-      if (element.bushing >= 0) continue;
+      if (element.bushing >= 0 || IsFurtherOfBall(m_, element)) continue;
       text += fmt::format(
-          "  {}: {{{}}}\n", FreshName(element.name, &taken),
+          "  {}: {{{}}}\n", FreshName(FileName(m_, element), &taken),
           ElementText(element, PlaceOf(element) + Carrier(element), ActsOnLength(m_, element)));
     }
     if (!m_.springs.empty()) text += "springs:\n";
@@ -330,8 +333,9 @@ class ModelWriter {
 
   [[nodiscard]] std::string PlaceOf(const ForceElement& element) const {
     if (element.drive >= 0) return "drive: " + names_.drives[element.drive];
-    return fmt::format("joint: {}{}", names_.joints[element.joint],
-                       CoordinateText(element.coordinate));
+    return fmt::format(
+        "joint: {}{}", names_.joints[element.joint],
+        ActsOnBall(m_, element) ? kRotationText : CoordinateText(element.coordinate));
   }
 
   const Mechanism& m_;

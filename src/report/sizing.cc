@@ -101,6 +101,12 @@ std::string CloudHtml(const Motor& motor, const MotorLoad& load) {
     PlotLine line = CurveOf(motor, peak, 1.05 * load.peak_speed);
     if (!line.points.empty()) plot.lines.push_back(std::move(line));
   }
+  for (const auto& [label, torque] :
+       {std::pair("peak, forward", motor.most), {"peak, backward", -motor.least}}) {
+    if (!std::isfinite(torque)) continue;
+    plot.lines.push_back(
+        {.label = label, .points = {{0.0, torque}, {1.05 * load.peak_speed, torque}}});
+  }
   return FigureHtml(ToSvg(plot));
 }
 

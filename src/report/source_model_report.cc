@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "base/json_text.h"
+#include "base/text.h"
 #include "report/page.h"
 
 namespace mbv {
@@ -117,7 +118,11 @@ nlohmann::ordered_json SourceModelJson(const SourceModelAudit& audit) {
   json["recommended"] = audit.recommended;
   json["lines"] = audit.lines;
   json["closures_with_own_settings"] = audit.stubborn;
-  if (!audit.lines.empty()) json["pasted"] = ErrorJson(audit.pasted);
+  json["settings_alone"] = ErrorJson(audit.bare);
+  if (!audit.lines.empty()) {
+    json["pasted"] = ErrorJson(audit.pasted);
+    json["pasted_as_is"] = ErrorJson(audit.pasted_as_is);
+  }
   json["seconds"] = Number(audit.seconds);
   return json;
 }
@@ -180,6 +185,17 @@ std::vector<std::string> MeasuredLines(const SourceModelAudit& audit) {
   if (std::isfinite(e.joint_force)) {
     lines.push_back(fmt::format(
         "forces in the joints that close the loops: error {:.1e} of their RMS", e.joint_force));
+  }
+  if (audit.bare.sound()) {
+    std::string text = fmt::format(
+        "of it the file's settings alone, with its drives led exactly and without what the "
+        "reference does not have: {:.1e}",
+        audit.bare.force);
+    for (const SourceModelCause& cause : audit.causes) {
+      if (cause.key != "left_out" || !cause.alone.sound()) continue;
+      text += fmt::format("; {}, alone: {:.1e}", cause.title, cause.alone.force);
+    }
+    lines.push_back(text);
   }
   return lines;
 }
@@ -263,6 +279,16 @@ std::vector<std::string> SearchLines(const SourceModelAudit& audit) {
   return lines;
 }
 
+// What no line of settings takes away.
+std::string RestOf(const SourceModelAudit& audit) {
+  std::string rest;
+  for (const SourceModelCause& cause : audit.causes) {
+    if (!Contains({"drives", "friction", "left_out"}, cause.key)) continue;
+    rest += (rest.empty() ? "" : "; ") + cause.title;
+  }
+  return rest.empty() ? "what is left is not known" : "what settings of loops leave: " + rest;
+}
+
 std::vector<std::string> PastedLines(const SourceModelAudit& audit) {
   if (audit.lines.empty()) return {};
   std::vector<std::string> lines;
@@ -274,12 +300,22 @@ std::vector<std::string> PastedLines(const SourceModelAudit& audit) {
         "there, too: {}",
         names));
   }
-  lines.push_back(audit.pasted.sound()
-                      ? fmt::format("run with these lines in it, the file gives a force error of "
-                                    "{:.2e} and a loop gap of {:.1e} m",
-                                    audit.pasted.force, audit.pasted.gap_m)
-                      : "run with these lines in it, the file gives nothing: " +
-                            audit.pasted.failure);
+  if (!audit.pasted.sound()) {
+    lines.push_back("run with these lines in it, the file gives nothing: " + audit.pasted.failure);
+    return lines;
+  }
+  lines.push_back(fmt::format(
+      "run with these lines in it, its drives led exactly and without what the reference does not "
+      "have, the file gives a force error of {:.2e} and a loop gap of {:.1e} m",
+      audit.pasted.force, audit.pasted.gap_m));
+  const SourceModelError& own = audit.pasted_as_is;
+  lines.push_back(
+      own.sound() ? fmt::format("run with these lines in it and nothing else changed: force "
+                                "error {:.2e}, loop gap {:.1e} m{}",
+                                own.force, own.gap_m, audit.Good(own) ? "" : "; " + RestOf(audit))
+                  : "run with these lines in it and nothing else changed, the file gives "
+                    "nothing: " +
+                        own.failure);
   return lines;
 }
 

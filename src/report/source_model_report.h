@@ -76,7 +76,8 @@ struct SourceModelAudit {
   int recommended = -1;                  ///< of the trials
   std::string lines;                     ///< to paste
   std::vector<std::string> stubborn;     ///< closures that state settings of their own
-  SourceModelError pasted;               ///< with the lines in the file
+  SourceModelError pasted;               ///< with the lines in the file, led as `bare` is
+  SourceModelError pasted_as_is;         ///< with the lines in the file and nothing else changed
   double seconds = 0.0;                  ///< all of this
 
   static constexpr double kGoodForce = 0.01;  ///< papers accept 1 to 6 % against other programs

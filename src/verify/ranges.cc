@@ -7,6 +7,7 @@
 
 #include "base/demand.h"
 #include "kinematics/home.h"
+#include "math/spatial.h"
 
 namespace mbv {
 namespace {
@@ -27,12 +28,22 @@ void Visit(double value, double time_s, RangeViolation* worst) {
   worst->time_s = time_s;
 }
 
+constexpr int kRotation = -1;  // in the place of a coordinate
+
+// |log R_FM|
+double RotationOf(const Joint& joint, const std::vector<Pose>& X_WB) {
+  const Mat3 R_WF = X_WB[static_cast<size_t>(joint.parent)].linear() * joint.X_PF.linear();
+  const Mat3 R_WM = X_WB[static_cast<size_t>(joint.child)].linear() * joint.X_CM.linear();
+  return LogRotation(R_WF.transpose() * R_WM).norm();
+}
+
 const char* UnitOf(const Joint& joint, int coordinate) {
   return IsLength(joint.kind, coordinate) ? "m" : "rad";
 }
 
 std::string JointText(const Joint& joint, int coordinate) {
   if (DofsOf(joint.kind) == 1) return "joint " + joint.name;
+  if (coordinate == kRotation) return fmt::format("joint {} (angle of rotation)", joint.name);
   return fmt::format("joint {} (coordinate {})", joint.name, coordinate + 1);
 }
 
@@ -81,13 +92,21 @@ std::vector<RangeViolation> JointViolations(const Mechanism& mechanism,
       watched.push_back(
           {j, c, {.what = JointText(joint, c), .range = range, .unit = UnitOf(joint, c)}});
     }
+    if (!std::isfinite(joint.max_rotation)) continue;
+    watched.push_back(
+        {j,
+         kRotation,
+         {.what = JointText(joint, kRotation), .range = {0.0, joint.max_rotation}, .unit = "rad"}});
   }
   if (watched.empty()) return {};
   for (size_t i = 0; i < X_WB.size() && i < time_s.size(); ++i) {
     if (X_WB[i].size() != mechanism.bodies.size()) break;
     coordinates = JointCoordinatesAt(mechanism, X_WB[i], coordinates);
     for (Watched& w : watched) {
-      Visit(coordinates[w.joint][static_cast<size_t>(w.coordinate)], time_s[i], &w.worst);
+      const double value = w.coordinate == kRotation
+                               ? RotationOf(mechanism.joints[w.joint], X_WB[i])
+                               : coordinates[w.joint][static_cast<size_t>(w.coordinate)];
+      Visit(value, time_s[i], &w.worst);
     }
   }
   std::vector<RangeViolation> violations;
@@ -100,7 +119,8 @@ std::vector<RangeViolation> JointViolations(const Mechanism& mechanism,
 bool HasRanges(const Mechanism& mechanism) {
   return std::any_of(mechanism.joints.begin(), mechanism.joints.end(),
                      [](const Joint& joint) {
-                       return std::any_of(joint.range.begin(), joint.range.end(), IsBounded);
+                       return std::isfinite(joint.max_rotation) ||
+                              std::any_of(joint.range.begin(), joint.range.end(), IsBounded);
                      }) ||
          std::any_of(mechanism.drives.begin(), mechanism.drives.end(),
                      [](const Drive& drive) { return IsBounded(drive.range); });
@@ -118,6 +138,8 @@ bool IsWithinRanges(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
     for (size_t c = 0; c < static_cast<size_t>(DofsOf(joint.kind)); ++c) {
       if (!inside(coordinates[j][c], joint.range[c])) return false;
     }
+    const bool limited = std::isfinite(joint.max_rotation);
+    if (limited && !inside(RotationOf(joint, X_WB), {0.0, joint.max_rotation})) return false;
   }
   return std::all_of(mechanism.drives.begin(), mechanism.drives.end(), [&](const Drive& drive) {
     if (const auto* of_joint = std::get_if<JointDrive>(&drive.kind)) {

@@ -66,6 +66,52 @@ TEST(MotorLoad, ASineAsksForItsAmplitudeOverTheRootOfTwo) {
   EXPECT_NEAR(load.above_continuous, 1.0 - 2 * std::asin(0.9) / pi, 2e-3);
 }
 
+// Of A sin, half of the time on each side: a motor of one side has a margin of 0 unless its side is
+// all that is asked for, and each side counts by itself.
+TEST(MotorLoad, SidesCountByThemselves) {
+  const double none = Motor::kNoLimit;
+  struct Case {
+    double least, most, use;
+  };
+  for (const Case& c : {Case{-none, 2.5, kA / 2.5},
+                        {-2.5, none, kA / 2.5},
+                        {-4, 2.5, kA / 2.5},
+                        {-2.5, 4, kA / 2.5},
+                        {0, 2.5, none},
+                        {-2.5, 0, none},
+                        {1, 2.5, none}}) {
+    Motor motor;
+    motor.drive = 0;
+    motor.least = c.least;
+    motor.most = c.most;
+    const MotorLoad load = LoadOf(motor, SineTrace());
+    ASSERT_EQ(load.uses.size(), 1u);
+    if (std::isinf(c.use)) {
+      EXPECT_EQ(load.margin(), 0.0) << c.least;
+    } else {
+      EXPECT_NEAR(load.largest_use(), c.use, 1e-12) << c.least;
+    }
+  }
+  // Pulling only: what is round-off of the other side is nothing, twice that is asked for.
+  Trace pulls = SineTrace();
+  const int force = pulls.Find("d1.force");
+  ASSERT_GE(force, 0);
+  pulls.values.col(force) = pulls.values.col(force).cwiseAbs();
+  Motor cable;
+  cable.drive = 0;
+  cable.least = 0.0;
+  cable.most = 2.5;
+  for (const double back : {-0.5e-9, -2e-9}) {
+    pulls.values(0, force) = back * kA;
+    const MotorLoad load = LoadOf(cable, pulls);
+    if (back < -1e-9) {
+      EXPECT_EQ(load.margin(), 0.0);
+    } else {
+      EXPECT_NEAR(load.margin(), 2.5 / kA, 1e-9);
+    }
+  }
+}
+
 // A quarter of a period late: as much energy comes back as goes in, A V T/2π per half wave.
 TEST(MotorLoad, PowerHasBothSigns) {
   const MotorLoad load = LoadOf(Plain(), SineTrace(pi / 2));

@@ -55,8 +55,8 @@ TEST(Motors, OfASlideSlidesUnlessItHasALead) {
 
 TEST(Motors, ReadBackFromTheWrittenModel) {
   const Mechanism a = LoadMotors(kTwoDrives + std::string(R"(motors:
-  x: {continuous: 2, peak: 3, lead_mm: 5, rated_speed: 7, max_speed_rpm: 3000, efficiency: 0.8}
-  z: {peak_curve_rpm: [[0, 3], [600, 1]], rotor_inertia: 1e-4, torque_constant: 0.5, voltage: 24,
+  x: {continuous: 2, peak: 3, peak_range: [null, 2.5], lead_mm: 5, rated_speed: 7, max_speed_rpm: 3000, efficiency: 0.8}
+  z: {peak_curve_rpm: [[0, 3], [600, 1]], peak_range: [-1, 2], rotor_inertia: 1e-4, torque_constant: 0.5, voltage: 24,
       resistance: 1, continuous_current: 2, peak_current: 3}
 )"));
   const Mechanism b = LoadMotors(WriteModel(a));
@@ -68,6 +68,8 @@ TEST(Motors, ReadBackFromTheWrittenModel) {
     EXPECT_EQ(x.gear_ratio, y.gear_ratio);
     EXPECT_EQ(x.continuous, y.continuous);
     EXPECT_EQ(x.peak, y.peak);
+    EXPECT_EQ(x.least, y.least);
+    EXPECT_EQ(x.most, y.most);
     EXPECT_EQ(x.rated_speed, y.rated_speed);
     EXPECT_EQ(x.max_speed, y.max_speed);
     EXPECT_EQ(x.rotor_inertia, y.rotor_inertia);
@@ -88,7 +90,7 @@ TEST(Motors, AreNoLiteralsOfTheMechanism) {
   const auto literals = [](const std::string& more) {
     return LoadModelText(kTwoDrives + more, "motors.yaml").literals.size();
   };
-  EXPECT_EQ(literals("motors: {x: {continuous: 2, peak: 3}}\n"), literals(""));
+  EXPECT_EQ(literals("motors: {x: {continuous: 2, peak_range: [0, 3]}}\n"), literals(""));
 }
 
 }  // namespace

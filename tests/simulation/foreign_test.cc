@@ -29,7 +29,7 @@ using mjcf::ForeignRow;
 
 // An arm of two bodies on hinges and one on a ball. Each part of the file takes more text.
 struct Parts {
-  std::string head = {}, arm = {}, joint = {}, in_arm = {}, in_world = {}, ball = {}, tail = {};
+  std::string head = {}, arm = {}, joint = {}, in_arm = {}, in_world = {}, tail = {};
 };
 std::string Arm(const Parts& p = {}) {
   return R"(<mujoco model="arm"><compiler angle="radian"/>)" + p.head + "<worldbody>" + p.in_world +
@@ -38,7 +38,7 @@ std::string Arm(const Parts& p = {}) {
          R"(<body name="lower" pos="0 0 0.4"><joint name="B" axis="0 1 0"/>)"
          R"(<inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.001"/>)" +
          R"(<site name="tip" pos="0 0 0.2"/></body></body>)" +
-         R"(<body name="bob" pos="1 0 0"><joint name="S" type="ball" )" + p.ball +
+         R"(<body name="bob" pos="1 0 0"><joint name="S" type="ball" )"
          R"(/><inertial pos="0 0 -0.1" mass="1" diaginertia="0.01 0.01 0.001"/>)"
          R"(<geom name="shell" type="sphere" size="0.05" contype="0" conaffinity="0" )"
          "/></body></worldbody>" +
@@ -83,7 +83,6 @@ std::map<std::string, Sample> Samples() {
     return Arm({.head = "<option " + with + "/>"});
   };
   const auto joint = [](const std::string& with) { return Arm({.joint = with}); };
-  const auto ball = [](const std::string& with) { return Arm({.ball = with}); };
   const auto actuator = [](const std::string& with) {
     return Arm({.tail = "<actuator>" + with + "</actuator>"});
   };
@@ -99,27 +98,12 @@ std::map<std::string, Sample> Samples() {
   const auto equality = [](const std::string& with) {
     return Arm({.tail = "<equality>" + with + "</equality>"});
   };
-  // A floating body that a closure carries.
-  const auto carried = [](const std::string& with) {
-    return Arm({.in_world = "<body name='loose' pos='5 0 0'><joint type='free' " + with +
-                            "/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body>",
-                .tail = "<equality><weld body1='upper' body2='loose'/></equality>"});
-  };
   std::map<std::string, Sample> samples = {
       {"option density", {option("density='1.2'"), option("density='0'")}},
       {"option viscosity", {option("viscosity='1e-3'"), option("viscosity='0'")}},
       {"option wind", {option("density='1.2' wind='1 0 0'"), option("wind='1 0 0'")}},
       {"asset/mesh inertia", {of_mesh("inertia='shell'"), of_mesh("inertia='legacy'")}},
-      {"ball stiffness", {ball("stiffness='3'"), ball("stiffness='0'")}},
-      {"ball damping", {ball("damping='3'"), ball("damping='0'")}},
-      {"ball frictionloss", {ball("frictionloss='3'"), ball("frictionloss='0'")}},
-      {"ball armature", {ball("armature='3'"), ball("armature='0'")}},
-      {"ball range", {ball("limited='true' range='0 1'"), ball("limited='false' range='0 1'")}},
-      {"free armature", {carried("armature='3'"), carried("armature='0'")}},
-      {"free frictionloss", {carried("frictionloss='3'"), carried("frictionloss='0'")}},
-      {"free damping", {carried("damping='3'"), carried("damping='0'")}},
-      {"free stiffness", {carried("stiffness='3'"), carried("stiffness='0'")}},
-      {"hinge or slide damping", {joint("damping='-0.1'"), joint("damping='0.1'")}},
+      {"any joint damping", {joint("damping='-0.1'"), joint("damping='0.1'")}},
       {"stiffness 2nd", {joint("stiffness='3 1 2'"), joint("stiffness='3 0 0'")}},
       {"springlength 2nd",
        {spatial("stiffness='3' springlength='0.1 0.2'"), spatial("springlength='0.2'")}},
@@ -563,7 +547,6 @@ TEST(ForeignMjcf, LimitsOfActuatorsAreMotors) {
            {"<motor joint='A' gear='5' ctrllimited='true' ctrlrange='-2 2'/>", "", 5, 2},
            {"<motor joint='A' gear='-5' ctrlrange='-2 2'/>", "", 5, 2},
            {"<motor joint='A' gear='5' ctrllimited='false' ctrlrange='-2 2'/>", "", 5, none},
-           {"<motor joint='A' ctrllimited='true' ctrlrange='-2 1'/>", "", 1, 1},
            {"<motor joint='A' ctrlrange='-2 2' forcerange='-1.5 1.5'/>", "", 1, 1.5},
            {"<general joint='A' gainprm='30' gear='2' ctrlrange='-2 2'/>", "", 2, 60},
            {"<general joint='A' gainprm='30' biastype='affine' biasprm='0 -30 0' ctrlrange='-2 2' "
@@ -594,6 +577,39 @@ TEST(ForeignMjcf, LimitsOfActuatorsAreMotors) {
     EXPECT_TRUE(m.motors[0].peak == c.peak || std::abs(m.motors[0].peak - c.peak) < 1e-12)
         << c.actuator;
     EXPECT_TRUE(m.motors[0].turns);
+  }
+}
+
+// A side on which the actuators push less, or not at all, keeps it; a gear below 0 turns sides
+// round.
+TEST(ForeignMjcf, LimitsOfOneSideAreThatSides) {
+  struct Case {
+    std::string actuators, joint;
+    double n, least, most;
+  };
+  const double none = Motor::kNoLimit;
+  for (const Case& c : std::vector<Case>{
+           {"<motor joint='A' ctrllimited='true' ctrlrange='-2 1'/>", "", 1, -2, 1},
+           {"<motor joint='A' ctrlrange='0 100'/>", "", 1, 0, 100},
+           {"<motor joint='A' gear='-4' ctrlrange='0 100'/>", "", 4, -100, 0},
+           {"<motor joint='A' gear='4' ctrlrange='-1 1' forcerange='-0.5 3'/>", "", 4, -0.5, 1},
+           {"<position joint='A' kp='100' forcerange='0 30'/>", "", 1, 0, 30},
+           {"<motor joint='A' gear='2' ctrlrange='0 3'/>", "actuatorfrcrange='-1 4'", 2, 0, 2},
+           {"<motor joint='A' ctrlrange='0 3'/><motor joint='A' gear='-1' ctrlrange='0 5'/>", "", 1,
+            -5, 3},
+           {"<motor joint='A'/><motor joint='A' gear='-1' ctrlrange='0 5'/>", "", 1, -none, none},
+           {"<motor joint='A' ctrlrange='5 9'/>", "", 1, 5, 9}}) {
+    const Read read =
+        ReadText(Arm({.joint = c.joint, .tail = "<actuator>" + c.actuators + "</actuator>"}));
+    ASSERT_TRUE(read.model) << c.actuators << read.diagnostics.Text();
+    const Mechanism& m = read.model->mechanism;
+    const bool limited = std::isfinite(c.least) || std::isfinite(c.most);
+    ASSERT_EQ(m.motors.size(), limited ? 1u : 0u) << c.actuators;
+    if (!limited) continue;
+    EXPECT_EQ(m.motors[0].peak, none);
+    EXPECT_DOUBLE_EQ(m.motors[0].gear_ratio, c.n) << c.actuators;
+    EXPECT_DOUBLE_EQ(m.motors[0].least, c.least) << c.actuators;
+    EXPECT_DOUBLE_EQ(m.motors[0].most, c.most) << c.actuators;
   }
 }
 

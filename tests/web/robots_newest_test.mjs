@@ -1,11 +1,14 @@
 // How an import is held against the newest MuJoCo: each comparison on a file of known answers, and
 // that it fails where the import is slightly wrong.
 import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
 import {test} from 'node:test';
 import {fileURLToPath} from 'node:url';
 
 import {compile, load} from '../../examples/witness/mujoco/engine.mjs';
-import {COMPILED, isWithin, MOVING, quaternion, Robot, rotation, turned} from '../../scripts/robots_newest.mjs';
+import {checkFile, COMPILED, isWithin, MOVING, quaternion, Robot, rotation, turned} from '../../scripts/robots_newest.mjs';
 
 const engine = await load(fileURLToPath(import.meta.url));
 
@@ -76,3 +79,25 @@ test('Quaternions of rotations, any of whose components may be largest', () => {
   }
   assert.deepEqual(turned(IDENTITY, [1, 2, 3]), [1, 0, 0, 0, 2, 0, 0, 0, 3]);
 });
+
+// Each number of a ball, and of a free joint that loops carry, which mbverify imports as they are.
+for (const file of ['ball_wrist.xml', 'free_platform.xml']) {
+  test(`Drive forces of ${file} are the newest MuJoCo's, and not with another number in its joint`, {skip: !process.env.MBVERIFY && 'MBVERIFY is not set'}, () => {
+    const scratch = fs.mkdtempSync(path.join(os.tmpdir(), 'robots_newest_test'));
+    const whole = fileURLToPath(new URL(`robots/${file}`, import.meta.url));
+    const check = (change) => checkFile(engine, process.env.MBVERIFY, whole, scratch, change);
+    const row = check();
+    assert.ok(isWithin(row) && row.moving < 1e-11, JSON.stringify(row));
+    assert.deepEqual(row.notes, []);
+    for (const number of ['damping', 'armature', 'frictionloss', 'stiffness']) {
+      let changed = 0;
+      const other = check((text) => text.replace(new RegExp(`(type="(ball|free)"[^>]* ${number}=")([^"]*)`), (_, before, _kind, value) => {
+        changed += 1;
+        return before + Number(value) * (1 + 1e-3);
+      }));
+      assert.equal(changed, 1);
+      assert.ok(!isWithin(other), `${number}: ${other.moving}`);
+    }
+    fs.rmSync(scratch, {recursive: true});
+  });
+}

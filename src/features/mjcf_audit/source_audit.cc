@@ -457,6 +457,7 @@ class Search {
       }
     }
     audit_.pasted = pasted.error;
+    if (pasted.error.sound()) audit_.pasted_as_is = runs_.Run({}, text).error;
   }
 
   static std::vector<std::string> Stubborn(const SourceModelFacts& facts,

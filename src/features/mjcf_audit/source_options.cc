@@ -281,25 +281,29 @@ class SettingsTaker {
   }
 
   [[nodiscard]] bool HasFriction(int dof) const {
-    return IsScalar(*m_, m_->dof_jntid[dof]) && m_->dof_frictionloss[dof] > 0.0;
+    return !IsHeld(m_->dof_jntid[dof]) && m_->dof_frictionloss[dof] > 0.0;
+  }
+
+  // A tendon that the mechanism has as a spring and damper.
+  [[nodiscard]] bool IsSpring(int tendon) const {
+    const std::string name = NameAt(*m_, mjOBJ_TENDON, tendon, "tendon");
+    return std::ranges::any_of(imported_.mechanism.springs,
+                               [&](const SpringDamper& spring) { return spring.name == name; });
   }
 
   // Calls visit(word, value) on every number that acts on forces and that the mechanism lacks.
   template <typename Visit>
   void ForLeftOut(const Visit& visit) {
     for (int dof = 0; dof < m_->nv; ++dof) {
-      if (IsHeld(m_->dof_jntid[dof])) continue;
-      if (IsScalar(*m_, m_->dof_jntid[dof])) continue;  // force elements
-      visit("friction loss", &m_->dof_frictionloss[dof]);
-      visit("armature", &m_->dof_armature[dof]);
-      visit("damping", &m_->dof_damping[dof]);
-    }
-    for (int j = 0; j < m_->njnt; ++j) {
-      if (!IsScalar(*m_, j) && !IsHeld(j)) visit("springs of balls", &m_->jnt_stiffness[j]);
+      if (!IsHeld(m_->dof_jntid[dof]) && m_->dof_damping[dof] < 0.0) {
+        visit("negative damping", &m_->dof_damping[dof]);
+      }
     }
     for (int t = 0; t < m_->ntendon; ++t) {
-      visit("tendon springs", &m_->tendon_stiffness[t]);
-      visit("tendon damping", &m_->tendon_damping[t]);
+      if (!IsSpring(t)) {
+        visit("tendon springs", &m_->tendon_stiffness[t]);
+        visit("tendon damping", &m_->tendon_damping[t]);
+      }
       visit("tendon friction", &m_->tendon_frictionloss[t]);
     }
     visit("the medium's density", &m_->opt.density);

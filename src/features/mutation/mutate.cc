@@ -18,6 +18,7 @@
 #include "features/mutation/mutation_report.h"
 #include "mechanism/channels.h"
 #include "mechanism/motion.h"
+#include "model_file/element_text.h"
 #include "model_file/load_model.h"
 #include "model_file/yaml/parsed_documents.h"
 #include "model_file/yaml/units.h"
@@ -151,7 +152,8 @@ std::string ElementUnit(const Mechanism& mechanism, const std::vector<std::strin
   if (Has(keys, "inertia")) return "kg m^2";
   if (Has(keys, "radius")) return "m";
   for (const ForceElement& element : mechanism.elements) {
-    const std::string name = element.name.substr(element.name.rfind('.') + 1);
+    const std::string file_name = FileName(mechanism, element);
+    const std::string name = file_name.substr(file_name.rfind('.') + 1);
     if (keys.size() < 2 || keys[keys.size() - 2] != name) continue;
     const bool length = ActsOnLength(mechanism, element);
     if (Has(keys, "damping")) return length ? "N s/m" : "N m s/rad";
@@ -484,6 +486,7 @@ bool RangesDiffer(const Mechanism& a, const Mechanism& b) {
     for (size_t c = 0; c < 6; ++c) {
       if (!SameRanges(a.joints[j].range[c], b.joints[j].range[c])) return true;
     }
+    if (!Same(a.joints[j].max_rotation, b.joints[j].max_rotation)) return true;
   }
   return !Which(a.drives, b.drives, [](const Drive& x, const Drive& y) {
             return !SameRanges(x.range, y.range);

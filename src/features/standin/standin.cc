@@ -479,7 +479,8 @@ class StandinComputer {
       const auto at = std::ranges::find(transmission_.drives, motor.drive);
       if (at == transmission_.drives.end()) continue;
       const auto k = at - transmission_.drives.begin();
-      force[k] = PeakTorque(motor, 0.0) * motor.gear_ratio * motor.efficiency;
+      force[k] = std::min({PeakTorque(motor, 0.0), motor.most, -motor.least}) * motor.gear_ratio *
+                 motor.efficiency;
       double fastest = motor.max_speed;
       if (!motor.peak_curve.empty()) fastest = std::min(fastest, motor.peak_curve.back().speed);
       speed[k] = fastest / motor.gear_ratio;

@@ -754,7 +754,8 @@ class Companion {
     }
     for (size_t b = 0; b < m_.bushings.size(); ++b) WriteBushing(b);
     for (const ForceElement& element : m_.elements) {
-      if (element.bushing < 0 && !IsUrdfDynamics(m_, element)) WriteElement(element);
+      if (element.bushing >= 0 || IsUrdfDynamics(m_, element)) continue;
+      if (!IsFurtherOfBall(m_, element)) WriteElement(element);
     }
     for (const SpringDamper& s : m_.springs) {
       const std::string name = YamlName(s.name);
@@ -780,7 +781,8 @@ class Companion {
       place = "drive: " + YamlName(m_.drives[static_cast<size_t>(element.drive)].name);
     } else {
       const auto [joint, k] = FindCoordinate(element.joint, element.coordinate);
-      place = fmt::format("joint: \"{}\"{}", joint, CoordinateText(k));
+      place = fmt::format("joint: \"{}\"{}", joint,
+                          ActsOnBall(m_, element) ? kRotationText : CoordinateText(k));
     }
     if (IsGyroscopic(element)) {
       const RotorAxis& axis = *std::get<RotorLaw>(element.law).carrier;

@@ -263,6 +263,11 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
   const bool released = motion.free() || IsReleased(engine);
   for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
+    if (HasFriction(element) && engine.elements[e].turned) {
+      return FrictionUnsupported(engine, e,
+                                 "MuJoCo's ball has other axes than the joint's frame on its "
+                                 "child, and friction is limited about each by itself");
+    }
     if (released && HasFriction(element)) {
       const std::string why = FrictionTrouble(element, drives, own_events);
       if (!why.empty()) return FrictionUnsupported(engine, e, why);

@@ -107,6 +107,32 @@ void FindElementBodies(const EngineModel& engine, const ForceElement& element,
   place->bushing_child = EngineBody(engine, bushing.child);
 }
 
+// MuJoCo's velocities of a ball are those of its outboard body, seen from the inboard one, about
+// axes of the outboard one: where that is not the child, or M's axes are not its own, the three
+// elements of a rotation still are these three together, but for friction. A free joint's first
+// three are those of the body's origin along the world's axes.
+bool FindOfBallOrFree(const EngineModel& engine, const ForceElement& element, ElementPlace* place) {
+  const mjModel& m = *engine.m;
+  const Joint& joint = engine.mechanism->joints[static_cast<size_t>(element.joint)];
+  const auto is_round = [&](int id) {
+    return m.jnt_type[id] == mjJNT_BALL || m.jnt_type[id] == mjJNT_FREE;
+  };
+  const std::vector<int>& ids = engine.joint_ids[static_cast<size_t>(element.joint)];
+  const auto round = std::ranges::find_if(ids, is_round);
+  if (round == ids.end()) return false;
+  const bool free = m.jnt_type[*round] == mjJNT_FREE;
+  place->joint = *round;
+  place->dof = m.jnt_dofadr[*round] + (free ? 3 : 0) + BallAxis(joint.kind, element.coordinate);
+  place->qpos = m.jnt_qposadr[*round];  // has no meaning
+  const auto outboard = std::ranges::find(engine.body_id, m.jnt_bodyid[*round]);
+  const auto at = static_cast<size_t>(outboard - engine.body_id.begin());
+  place->turned =
+      engine.plan.bodies[at].body != joint.child || !joint.X_CM.linear().isIdentity(0.0);
+  if (IsOfBall(joint.kind, element.coordinate)) return true;
+  return free && !place->turned && joint.X_PF.linear().isIdentity(0.0) &&
+         joint.X_CM.translation().isZero(0.0);
+}
+
 RunSummary FindElements(EngineModel* engine) {
   const Mechanism& mechanism = *engine->mechanism;
   const mjModel& m = *engine->m;
@@ -124,7 +150,11 @@ RunSummary FindElements(EngineModel* engine) {
       continue;
     }
     const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
-    if (!IsScalar(joint.kind, element.coordinate)) {
+    if (IsScalar(joint.kind, element.coordinate)) {
+      place.joint = IdOf(m, mjOBJ_JOINT, mjcf::JointName(joint, element.coordinate));
+      place.dof = m.jnt_dofadr[place.joint];
+      place.qpos = m.jnt_qposadr[place.joint];
+    } else if (!FindOfBallOrFree(*engine, element, &place)) {
       return {.stop = Stop::kUnsupported,
               .message = "element '" + element.name + "' acts on a coordinate of the free joint '" +
                          joint.name + "', which MuJoCo does not have",
@@ -132,9 +162,6 @@ RunSummary FindElements(EngineModel* engine) {
               .unit = {},
               .names_where = true};
     }
-    place.joint = IdOf(m, mjOBJ_JOINT, mjcf::JointName(joint, element.coordinate));
-    place.dof = m.jnt_dofadr[place.joint];
-    place.qpos = m.jnt_qposadr[place.joint];
     engine->elements.push_back(place);
   }
   return RunSummary::Done();
@@ -167,6 +194,36 @@ void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data) {
   if (!weld) return;
   const Eigen::Quaterniond q(Mat3(X_1.linear() * X_2.linear().transpose()));
   Eigen::Map<Eigen::Vector4d>(eq_data + 6) << q.w(), q.x(), q.y(), q.z();
+}
+
+namespace {
+
+// The text of a free joint has one number for its six DOFs.
+void SetForcesOfBalls(EngineModel* engine) {
+  for (size_t e = 0; e < engine->elements.size(); ++e) {
+    const ElementPlace& place = engine->elements[e];
+    if (IsOfRoundJoint(*engine, e)) {
+      engine->m->dof_damping[place.dof] = engine->m->dof_armature[place.dof] = 0.0;
+    }
+  }
+  for (size_t e = 0; e < engine->elements.size(); ++e) {
+    const ElementPlace& place = engine->elements[e];
+    if (!IsOfRoundJoint(*engine, e)) continue;
+    const ForceElement& element = engine->mechanism->elements[e];
+    if (const auto* damping = std::get_if<DampingLaw>(&element.law)) {
+      engine->m->dof_damping[place.dof] += damping->damping;
+    } else if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
+      engine->m->dof_armature[place.dof] += rotor->reflected();
+    }
+  }
+}
+
+}  // namespace
+
+bool IsOfRoundJoint(const EngineModel& engine, size_t element) {
+  const int joint = engine.elements[element].joint;
+  return joint >= 0 &&
+         (engine.m->jnt_type[joint] == mjJNT_BALL || engine.m->jnt_type[joint] == mjJNT_FREE);
 }
 
 RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
@@ -205,6 +262,7 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   }
   MakeAnchorsExact(*engine);
   if (RunSummary summary = FindElements(engine); !summary.ok()) return summary;
+  SetForcesOfBalls(engine);
   return FindDriven(engine);
 }
 

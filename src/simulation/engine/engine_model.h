@@ -34,8 +34,13 @@ struct ElementPlace {
   int bushing_parent = -1, bushing_child = -1;
   int carrier = -1;       ///< MuJoCo's body whose turning a rotor feels
   bool armature = false;  ///< MuJoCo has such a rotor's inertia along its coordinate
+  bool turned = false;    ///< of a ball: MuJoCo's axes are not M's
   bool led = false;       ///< commands move the coordinate, loops included, where others are free
 };
+
+struct EngineModel;
+/// Whether an element acts on a ball or a free joint of MuJoCo.
+[[nodiscard]] bool IsOfRoundJoint(const EngineModel& engine, size_t element);
 
 /// A row of MuJoCo's frictionloss, and the elements with dry friction there.
 struct FrictionPlace {

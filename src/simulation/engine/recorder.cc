@@ -564,7 +564,25 @@ void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
   for (const auto& [row, id] : coupled_of_[joint]) {
     exclude(id, system_->J().coeff(row, engine_.m->jnt_dofadr[id]) * system_->force()[row]);
   }
-  for (const size_t e : elements_of_[joint]) exclude(engine_.elements[e].joint, ElementForce(e));
+  for (const size_t e : elements_of_[joint]) {
+    const ElementPlace& place = engine_.elements[e];
+    if (IsOfRoundJoint(engine_, e)) {
+      *F_W -= sign * ElementForce(e) * AxisOfRound(place);
+    } else {
+      exclude(place.joint, ElementForce(e));
+    }
+  }
+}
+
+// [moment; force] of a unit force along a velocity of a ball or free joint: moments about the axes
+// of its body, of free joints forces along the world's axes, too.
+Vec6 Recorder::AxisOfRound(const ElementPlace& place) const {
+  const mjModel& m = *engine_.m;
+  const int k = place.dof - m.jnt_dofadr[place.joint];
+  if (m.jnt_type[place.joint] == mjJNT_FREE && k < 3) return Vec6::Unit(3 + k);
+  Vec6 axis = Vec6::Zero();
+  axis.head<3>() = PoseOf(*system_->data(), m.jnt_bodyid[place.joint]).linear().col(k % 3);
+  return axis;
 }
 
 Vec6 Recorder::ReactionOf(int j, const std::vector<Pose>& X_WB) const {

@@ -133,6 +133,7 @@ class Recorder {
   void AddElement(size_t e);
   [[nodiscard]] Vec6 ReactionOf(int joint, const std::vector<Pose>& X_WB) const;
   [[nodiscard]] Vec6 ClosureWrench(int closure) const;
+  [[nodiscard]] Vec6 AxisOfRound(const ElementPlace& place) const;
   void ExcludeDrives(int joint, double sign, Vec6* F_W) const;
   [[nodiscard]] double ElementForce(size_t e) const;
 

@@ -3,6 +3,7 @@
 #include "simulation/import/mjcf_import.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -71,6 +72,11 @@ void AddJoint(int j, const Ends& ends, const Pose& X_PB, MjcfImport* in) {
       const Mat3 R = RotationAt(in->m.qpos0 + at).transpose() * RotationAt(in->qpos + at);
       const Vec3 rpy = RpyOf(R);
       joint.home = {rpy.x(), rpy.y(), rpy.z(), 0, 0, 0};
+      if (in->m.jnt_limited[j] != 0 && !in->LimitsAreOff()) {
+        // MuJoCo takes the larger of both numbers as the largest angle of rotation.
+        joint.max_rotation =
+            std::max(in->m.jnt_range[2 * j], in->m.jnt_range[2 * j + 1]) - in->m.jnt_margin[j];
+      }
       break;
     }
     default: {  // free
@@ -298,22 +304,26 @@ namespace {
 
 constexpr double kUnlimited = Motor::kNoLimit;
 
-// Limits of motors hold in both directions.
-double Magnitude(const mjtNum* range) { return std::min(std::abs(range[0]), std::abs(range[1])); }
+// What pushes along a coordinate, with its sign.
+struct Sides {
+  double least = -kUnlimited, most = kUnlimited;
 
-struct ActuatorLimit {
-  double force = kUnlimited;  ///< of one actuator
-  bool lopsided = false;      ///< one direction is limited more
+  [[nodiscard]] Sides Within(const Sides& other) const {
+    return {std::max(least, other.least), std::min(most, other.most)};
+  }
+  [[nodiscard]] Sides Times(double factor) const {
+    if (factor == 0.0) return {0.0, 0.0};
+    return factor > 0.0 ? Sides{factor * least, factor * most}
+                        : Sides{factor * most, factor * least};
+  }
 };
 
-ActuatorLimit LimitOf(const mjModel& m, int u) {
-  ActuatorLimit limit;
-  const auto take = [&](const mjtNum* range, double scale) {
-    if (scale * Magnitude(range) >= limit.force) return;
-    limit = {.force = scale * Magnitude(range),
-             .lopsided = std::abs(range[0]) != std::abs(range[1])};
-  };
-  if (m.actuator_forcelimited[u] != 0) take(m.actuator_forcerange + 2 * u, 1.0);
+Sides SidesOf(const mjtNum* range) { return {range[0], range[1]}; }
+
+// Of one actuator, ahead of its gear.
+Sides LimitOf(const mjModel& m, int u) {
+  Sides limit;
+  if (m.actuator_forcelimited[u] != 0) limit = SidesOf(m.actuator_forcerange + 2 * u);
   const mjtNum* bias = m.actuator_biasprm + mjNBIAS * u;
   const bool no_bias =
       m.actuator_biastype[u] == mjBIAS_NONE || (m.actuator_biastype[u] == mjBIAS_AFFINE &&
@@ -321,7 +331,8 @@ ActuatorLimit LimitOf(const mjModel& m, int u) {
   const bool direct = m.actuator_dyntype[u] == mjDYN_NONE || m.actuator_dyntype[u] == mjDYN_FILTER;
   if (no_bias && direct && m.actuator_gaintype[u] == mjGAIN_FIXED &&
       m.actuator_ctrllimited[u] != 0) {
-    take(m.actuator_ctrlrange + 2 * u, std::abs(m.actuator_gainprm[mjNGAIN * u]));
+    const double gain = m.actuator_gainprm[mjNGAIN * u];
+    limit = limit.Within(SidesOf(m.actuator_ctrlrange + 2 * u).Times(gain));
   }
   return limit;
 }
@@ -357,33 +368,33 @@ void AddMotor(size_t d, MjcfImport* in) {
   const mjModel& m = in->m;
   const Drive& drive = in->mechanism.drives[d];
   const Movers movers = MoversOf(drive, *in);
-  const auto gear = [&](int u) { return std::abs(m.actuator_gear[6 * u]); };
-  double most = 0.0;  // along the drive
-  bool lopsided = false;
+  const auto gear = [&](int u) { return m.actuator_gear[6 * u]; };
+  Sides sides{0.0, 0.0};  // along the drive
   for (const int u : movers.actuators) {
-    const ActuatorLimit limit = LimitOf(m, u);
-    if (gear(u) != 0.0) most += gear(u) * limit.force;
-    lopsided = lopsided || limit.lopsided;
+    if (gear(u) == 0.0) continue;
+    const Sides of = LimitOf(m, u).Times(gear(u));
+    sides = {sides.least + of.least, sides.most + of.most};
   }
   if (movers.joint >= 0 && in->JointNumber(movers.joint, mjcf::UserNumber::kForceLimited) != 0.0) {
-    const double ends[] = {in->JointNumber(movers.joint, mjcf::UserNumber::kForceLower),
-                           in->JointNumber(movers.joint, mjcf::UserNumber::kForceUpper)};
-    if (Magnitude(ends) < most) {
-      most = Magnitude(ends);
-      lopsided = std::abs(ends[0]) != std::abs(ends[1]);
-    }
+    sides = sides.Within({in->JointNumber(movers.joint, mjcf::UserNumber::kForceLower),
+                          in->JointNumber(movers.joint, mjcf::UserNumber::kForceUpper)});
   }
   const bool alone = movers.actuators.size() == 1 && gear(movers.actuators[0]) != 0.0;
-  const double n = alone ? gear(movers.actuators[0]) : 1.0;
-  if (lopsided) in->lopsided.push_back(drive.name);
-  if (!(most > 0.0) || (std::isinf(most) && n == 1.0)) return;
+  const double n = alone ? std::abs(gear(movers.actuators[0])) : 1.0;
+  const bool unlimited = std::isinf(sides.least) && std::isinf(sides.most);
+  if (!(sides.least < sides.most) || (unlimited && n == 1.0)) return;
   const auto* on = std::get_if<JointDrive>(&drive.kind);
   Motor motor;
   motor.drive = static_cast<int>(d);
   motor.turns = on != nullptr &&
                 in->mechanism.joints[static_cast<size_t>(on->joint)].kind == JointKind::kRevolute;
-  motor.peak = most / n;
   motor.gear_ratio = n;
+  if (sides.least == -sides.most) {
+    motor.peak = sides.most / n;
+  } else {
+    motor.least = sides.least / n;
+    motor.most = sides.most / n;
+  }
   in->mechanism.motors.push_back(std::move(motor));
 }
 
@@ -397,25 +408,68 @@ void AddMotors(MjcfImport* in) {
 
 namespace {
 
+// Where the forces of one joint go: a hinge's or slide's coordinate, a ball's rotation, or a free
+// joint's three coordinates and rotation.
+void AddLaw(int j, const char* what, const auto& law, MjcfImport* in) {
+  ForceElement element{
+      .name = in->JointNameOf(j) + what, .joint = in->joint_of[static_cast<size_t>(j)], .law = law};
+  std::vector<ForceElement>& elements = in->mechanism.elements;
+  const JointKind kind = in->mechanism.joints[static_cast<size_t>(element.joint)].kind;
+  if (!HasBall(kind)) {
+    elements.push_back(std::move(element));
+    return;
+  }
+  AddOfBall(element, kind, &elements);
+  for (int k = 0; k < FirstOfBall(kind); ++k) {
+    elements.push_back(element);
+    elements.back().name += std::array{"_x", "_y", "_z"}.at(static_cast<size_t>(k));
+    elements.back().coordinate = k;
+  }
+}
+
+// Of a ball, between its frames; of a free joint, between the world and its body where the file
+// places it. MuJoCo's moment is −k log R, as a bushing's of three equal stiffnesses.
+void AddRoundSpring(int j, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const bool free = m.jnt_type[j] == mjJNT_FREE;
+  const mjtNum* spring = m.qpos_spring + m.jnt_qposadr[j];
+  const Joint& joint =
+      in->mechanism.joints[static_cast<size_t>(in->joint_of[static_cast<size_t>(j)])];
+  in->mechanism.bushings.push_back({.name = joint.name + "_spring",
+                                    .parent = joint.parent,
+                                    .X_PF = free ? PoseAt(spring, spring + 3) : joint.X_PF,
+                                    .child = joint.child,
+                                    .X_CM = joint.X_CM});
+  for (int k = free ? 0 : 3; k < 6; ++k) {
+    ForceElement element{.name = joint.name + "_spring.",
+                         .coordinate = k,
+                         .bushing = static_cast<int>(in->mechanism.bushings.size()) - 1,
+                         .law = SpringLaw{.polynomial = {m.jnt_stiffness[j]}}};
+    element.name += BushingWord(element);
+    in->mechanism.elements.push_back(std::move(element));
+  }
+}
+
 void AddElementsOf(int j, MjcfImport* in) {
   const mjModel& m = in->m;
   const int dof = m.jnt_dofadr[j], at = m.jnt_qposadr[j];
-  const auto add = [&](const char* what, const auto& law) {
-    in->mechanism.elements.push_back({.name = in->JointNameOf(j) + what,
-                                      .joint = in->joint_of[static_cast<size_t>(j)],
-                                      .law = law});
-  };
   const bool passive = !in->IsOff(mjDSBL_PASSIVE);
-  if (passive && m.dof_damping[dof] > 0.0) add("_damping", DampingLaw{m.dof_damping[dof]});
+  if (passive && m.dof_damping[dof] > 0.0) {
+    AddLaw(j, "_damping", DampingLaw{m.dof_damping[dof]}, in);
+  }
   if (passive && m.dof_damping[dof] < 0.0) in->driving.push_back(in->JointNameOf(j));
   if (passive && m.jnt_stiffness[j] != 0.0) {
-    add("_spring",
-        SpringLaw{.polynomial = {m.jnt_stiffness[j]}, .free = m.qpos_spring[at] - m.qpos0[at]});
+    if (IsScalar(m, j)) {
+      const double free = m.qpos_spring[at] - m.qpos0[at];
+      AddLaw(j, "_spring", SpringLaw{.polynomial = {m.jnt_stiffness[j]}, .free = free}, in);
+    } else {
+      AddRoundSpring(j, in);
+    }
   }
   if (const double loss = m.dof_frictionloss[dof]; loss > 0.0 && !in->FrictionIsOff()) {
-    add("_friction", FrictionLaw{.coulomb = loss, .breakaway = loss});
+    AddLaw(j, "_friction", FrictionLaw{.coulomb = loss, .breakaway = loss}, in);
   }
-  if (m.dof_armature[dof] > 0.0) add("_rotor", RotorLaw{.inertia = m.dof_armature[dof]});
+  if (m.dof_armature[dof] > 0.0) AddLaw(j, "_rotor", RotorLaw{.inertia = m.dof_armature[dof]}, in);
 }
 
 }  // namespace
@@ -441,7 +495,8 @@ void AddSpring(int tendon, MjcfImport* in) {
 void AddElements(MjcfImport* in) {
   for (int t = 0; t < in->m.ntendon; ++t) AddSpring(t, in);
   for (int j = 0; j < in->m.njnt; ++j) {
-    if (IsScalar(in->m, j)) AddElementsOf(j, in);
+    // What a held body's free joint has does nothing.
+    if (in->m.jnt_type[j] != mjJNT_FREE || in->moves[static_cast<size_t>(j)]) AddElementsOf(j, in);
   }
 }
 
@@ -605,51 +660,12 @@ namespace {
 
 constexpr size_t kMost = 6;  // names that are reported
 
-// Balls, or free joints that move, of which something holds.
-std::vector<std::string> JointsWhere(const MjcfImport& in, int type, const auto& applies) {
-  std::vector<std::string> names;
-  for (int j = 0; j < in.m.njnt; ++j) {
-    if (in.m.jnt_type[j] != type || (type == mjJNT_FREE && !in.moves[static_cast<size_t>(j)])) {
-      continue;
-    }
-    if (applies(j)) names.push_back(in.JointNameOf(j));
-  }
-  return names;
-}
-
 void LeaveOutOf(const char* element, const char* attribute, const char* what,
                 const std::vector<std::string>& joints, MjcfImport* in) {
   if (joints.empty()) return;
   in->LeaveOut(element, attribute,
                fmt::format("{} of {} joint{} ({})", what, joints.size(),
                            joints.size() == 1 ? "" : "s", Joined(joints, kMost)));
-}
-
-void LeaveOutBallsAndFree(MjcfImport* in) {
-  const mjModel& m = in->m;
-  const auto any = [&m](const mjtNum* per_dof, int dofs) {
-    return [=, &m](int j) {
-      const mjtNum* first = per_dof + m.jnt_dofadr[j];
-      return std::any_of(first, first + dofs, [](mjtNum x) { return x != 0.0; });
-    };
-  };
-  for (const auto& [type, dofs, element] :
-       {std::tuple(mjJNT_BALL, 3, "ball"), {mjJNT_FREE, 6, "free"}}) {
-    const auto leave_out = [&, type = type, element = element](
-                               const char* attribute, const char* what, const auto& applies) {
-      LeaveOutOf(element, attribute, what, JointsWhere(*in, type, applies), in);
-    };
-    leave_out("armature", "armature", any(m.dof_armature, dofs));
-    if (!in->FrictionIsOff()) {
-      leave_out("frictionloss", "friction loss", any(m.dof_frictionloss, dofs));
-    }
-    if (in->IsOff(mjDSBL_PASSIVE)) continue;
-    leave_out("damping", "damping", any(m.dof_damping, dofs));
-    leave_out("stiffness", "stiffness", [&](int j) { return m.jnt_stiffness[j] != 0.0; });
-  }
-  if (in->LimitsAreOff()) return;
-  LeaveOutOf("ball", "range", "the range",
-             JointsWhere(*in, mjJNT_BALL, [&](int j) { return m.jnt_limited[j] != 0; }), in);
 }
 
 void LeaveOutFluid(MjcfImport* in) {
@@ -736,8 +752,7 @@ void MjcfImport::LeaveOut(const char* element, const char* attribute, const std:
 
 void WarnWhatIsLost(MjcfImport* in) {
   LeaveOutFluid(in);
-  LeaveOutBallsAndFree(in);
-  LeaveOutOf("hinge or slide", "damping", "the negative damping", in->driving, in);
+  LeaveOutOf("any joint", "damping", "the negative damping", in->driving, in);
   LeaveOutTendons(in);
   if (!in->held.empty()) {
     in->LeaveOut("body/freejoint", "", "the free joint of " + Joined(in->held, kMost));
@@ -747,9 +762,6 @@ void WarnWhatIsLost(MjcfImport* in) {
                         Joined(in->carried, kMost) + (in->carried.size() == 1 ? " is" : " are"),
                         in->carried.size() == 1 ? "a free joint" : "free joints"));
   }
-  WarnNames(*in,
-            "actuators of these drives push harder to one side, their motors' limit is the less: ",
-            in->lopsided);
   WarnNames(*in, "positions of these joints count from the file's reference (ref): ", in->shifted);
   WarnNames(*in, "zero is beyond the range of these joints, the loops are closed from inside it: ",
             in->moved);

@@ -52,8 +52,7 @@ struct MjcfImport {
   int held_inside = -1;
 
   // What the findings at the end report.
-  std::vector<std::string> held = {}, carried = {}, floating = {}, lopsided = {}, shifted = {},
-                           moved = {};
+  std::vector<std::string> held = {}, carried = {}, floating = {}, shifted = {}, moved = {};
   std::vector<std::string> driving = {};  ///< joints whose damping is negative
   std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
   std::set<int> driven_tendons = {};      ///< between two sites, with a drive
@@ -112,7 +111,7 @@ void AddDrives(MjcfImport* in);
 void AddMotors(MjcfImport* in);
 /// Closures, and couplings of joints.
 void AddEqualities(MjcfImport* in);
-/// Armature, damping, dry friction and springs of hinges and slides.
+/// Armature, damping, dry friction and springs of joints.
 void AddElements(MjcfImport* in);
 /// Gravity compensation of bodies, and the drives that exert their part of it.
 void AddCompensation(MjcfImport* in);

@@ -13,8 +13,6 @@ using enum Fate;
 constexpr const char* kFluid = "a fluid drags and lifts every body";
 constexpr const char* kPlugin = "a plugin may exert forces of any kind";
 constexpr const char* kActuatorLost = "the drive and its forces are missing";
-constexpr const char* kOfBall = "it exerts moments in the ball";
-constexpr const char* kOfFree = "it pushes the floating body";
 constexpr const char* kFlex = "a flexible body with its mass and elasticity is missing";
 constexpr const char* kMoreThanLinear = "the spring or damper is not linear";
 constexpr const char* kShape = "the parts of the composite are somewhere else";
@@ -92,16 +90,7 @@ const ForeignRow kRows[] = {
                    "springref armature damping frictionloss actuatorgravcomp actuatorfrclimited "
                    "actuatorfrcrange", kTaken},
     {"body/joint", "group solreflimit solimplimit solreffriction solimpfriction user", kNoForce},
-    {"ball", "stiffness", kLeftOut, kOfBall, "0", true},
-    {"ball", "damping", kLeftOut, kOfBall, "0", true},
-    {"ball", "frictionloss", kLeftOut, kOfBall, "0", true},
-    {"ball", "armature", kLeftOut, kOfBall, "0", true},
-    {"ball", "range", kLeftOut, "the ball is stopped at its limit", "", true},
-    {"free", "armature", kLeftOut, kOfFree, "0", true},
-    {"free", "frictionloss", kLeftOut, kOfFree, "0", true},
-    {"free", "damping", kLeftOut, kOfFree, "0", true},
-    {"free", "stiffness", kLeftOut, kOfFree, "0", true},
-    {"hinge or slide", "damping", kLeftOut, "a negative damper drives the joint", "0", true},
+    {"any joint", "damping", kLeftOut, "a negative damper drives the joint", "0", true},
     {"stiffness", "2nd", kLeftOut, kMoreThanLinear, "0"},
     {"springlength", "2nd", kLeftOut, "the tendon pulls outside a band of lengths"},
     {"damping", "2nd", kLeftOut, kMoreThanLinear, "0"},

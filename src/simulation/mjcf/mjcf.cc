@@ -87,12 +87,7 @@ class MjcfWriter {
   void WriteJoint(const PlannedJoint& joint, const Pose& X_WB) {
     using Type = PlannedJoint::Type;
     AppendHome(joint, X_WB);
-    if (joint.type == Type::kFree) {
-      xml_.Open("freejoint");
-      xml_.Set("name", joint.name);
-      xml_.Close();
-      return;
-    }
+    if (joint.type == Type::kFree) return WriteFree(joint);
     xml_.Open("joint");
     xml_.Set("name", joint.name);
     const bool slide = joint.type == Type::kSlide, ball = joint.type == Type::kBall;
@@ -101,14 +96,35 @@ class MjcfWriter {
     if (!ball) xml_.Set("axis", Vec3(X_WB.linear().transpose() * joint.axis_W));
     if (joint.ref != 0.0) xml_.Set("ref", joint.ref);
     if (!ball && joint.coordinate >= 0) WriteRange(joint);
-    if (!ball && joint.coordinate >= 0) WriteForces(joint);
+    if (ball) WriteRotation(joint);
+    if (!ball && joint.coordinate >= 0) WriteForces(joint, joint.coordinate);
     xml_.Close();
   }
 
+  void WriteFree(const PlannedJoint& joint) {
+    const mjcf::PlannedForces forces = mjcf::ForcesOfJoint(mechanism_, joint.joint, 0);
+    xml_.Open(forces.any() && mjcf::HasEqualForces(mechanism_, joint.joint) ? "joint"
+                                                                            : "freejoint");
+    xml_.Set("name", joint.name);
+    if (forces.any() && mjcf::HasEqualForces(mechanism_, joint.joint)) {
+      xml_.Set("type", "free");
+      WriteForces(joint, 0);
+    }
+    xml_.Close();
+  }
+
+  void WriteRotation(const PlannedJoint& joint) {
+    const Joint& of = mechanism_.joints[joint.joint];
+    if (!HasBall(of.kind)) return;  // a hinge that transmits a force only
+    if (std::isfinite(of.max_rotation)) {
+      xml_.Set("range", std::array<double, 2>{0.0, of.max_rotation});
+    }
+    WriteForces(joint, FirstOfBall(of.kind));
+  }
+
   // What MuJoCo has of the force elements.
-  void WriteForces(const PlannedJoint& joint) {
-    const mjcf::PlannedForces forces =
-        mjcf::ForcesOfJoint(mechanism_, joint.joint, joint.coordinate);
+  void WriteForces(const PlannedJoint& joint, int coordinate) {
+    const mjcf::PlannedForces forces = mjcf::ForcesOfJoint(mechanism_, joint.joint, coordinate);
     if (forces.stiffness != 0.0) {
       xml_.Set("stiffness", forces.stiffness);
       xml_.Set("springref", forces.free);
@@ -329,7 +345,10 @@ const char* DrivesText(const MjcfOptions& options) {
 std::string LackingText(const Mechanism& mechanism) {
   std::string names;
   for (const ForceElement& element : mechanism.elements) {
-    if (IsPlanned(element)) continue;
+    const bool of_free =
+        element.joint >= 0 && mechanism.joints[element.joint].kind == JointKind::kFree;
+    if (IsPlanned(element) && (!of_free || mjcf::HasEqualForces(mechanism, element.joint)))
+      continue;
     names += fmt::format("   {}: {}\n", InComment(element.name),
                          InComment(Described(mechanism, element)));
   }

@@ -384,6 +384,15 @@ PlannedForces ForcesOfJoint(const Mechanism& mechanism, int joint, int coordinat
   });
 }
 
+bool HasEqualForces(const Mechanism& mechanism, int free_joint) {
+  const PlannedForces first = ForcesOfJoint(mechanism, free_joint, 0);
+  for (int k = 1; k < 6; ++k) {
+    const PlannedForces other = ForcesOfJoint(mechanism, free_joint, k);
+    if (other.damping != first.damping || other.armature != first.armature) return false;
+  }
+  return true;
+}
+
 PlannedForces ForcesOfDrive(const Mechanism& mechanism, int drive) {
   return SumOf(mechanism, [&](const ForceElement& element) { return element.drive == drive; });
 }

@@ -100,6 +100,9 @@ struct PlannedForces {
 };
 /// Sums over the elements of a joint's coordinate; a preload moves the free position.
 [[nodiscard]] PlannedForces ForcesOfJoint(const Mechanism& mechanism, int joint, int coordinate);
+/// True where the sums of all six coordinates of a free joint are the same number, which is all
+/// that MuJoCo's text can say of one.
+[[nodiscard]] bool HasEqualForces(const Mechanism& mechanism, int free_joint);
 /// … of a distance drive, whose tendon has no armature.
 [[nodiscard]] PlannedForces ForcesOfDrive(const Mechanism& mechanism, int drive);
 /// True for what these contain: damping, linear springs, rotors of joints; nothing of a bushing and
