@@ -660,6 +660,155 @@ double ExplainedGap(const PrintedRounding& printed, const Mechanism& mechanism) 
                                          2.0 * printed.direction * CharacteristicLength(mechanism));
 }
 
+// Home poses from which loops can go on in several ways: a stretched parallelogram, which may stay
+// one or become a crossed one. Constraints that depend on each other there do not beside it.
+
+// How a group of loops goes on from home.
+struct WayOn {
+  Mechanism there;
+  int translating = 0;  // bodies that keep their orientation
+  double moved = 0.0;   // root mean square of the group's coordinates [rad, characteristic lengths]
+};
+
+class SingularHome {
+ public:
+  SingularHome(const Mechanism& home, const LoopGroup& group)
+      : home_(home), group_(group), length_m_(CharacteristicLength(home)), dofs_(CountDofs(home)) {}
+
+  /// Ways on, the likeliest first: links that keep their orientation are what parallelograms are
+  /// for; then what moves least. Empty where home is not singular.
+  std::vector<WayOn> Find() {
+    std::mt19937_64 random(20261128);
+    std::vector<WayOn> ways;
+    int closed = 0;
+    for (int i = 0; i < kTries; ++i) {
+      if (closed >= kEnoughToSee && ways.empty()) break;
+      WayOn way{.there = home_};
+      Kick(&random, &way.there);
+      const HomeResult result = SolveHome(&way.there);
+      if (!result.closed || result.drives_moved || result.guesses_moved) continue;
+      if (!Measure(&way)) continue;
+      ++closed;
+      if (CountDofs(way.there) < dofs_ && IsNew(way, ways)) ways.push_back(std::move(way));
+    }
+    std::ranges::stable_sort(ways, [](const WayOn& a, const WayOn& b) {
+      return std::pair(-a.translating, a.moved) < std::pair(-b.translating, b.moved);
+    });
+    return ways;
+  }
+
+  /// "B = -0.1, D = 0.1" of joints that move most.
+  [[nodiscard]] std::string Text(const Mechanism& there) const {
+    constexpr size_t kMost = 4;
+    std::vector<std::pair<double, int>> moved;
+    for (const int j : group_.joints) moved.emplace_back(-Distance(there, j), j);
+    std::sort(moved.begin(), moved.end());
+    std::vector<std::string> texts;
+    for (size_t i = 0; i < std::min(moved.size(), kMost); ++i) {
+      const Joint& joint = there.joints[moved[i].second];
+      texts.push_back(fmt::format("{} = {:.4g}", joint.name, joint.home[0]));
+    }
+    return Joined(texts);
+  }
+
+ private:
+  static constexpr int kTries = 24, kEnoughToSee = 2;
+  static constexpr double kStep = 0.1;      // rad, characteristic lengths
+  static constexpr double kFarthest = 1.0;  // beyond it another assembly is reached
+  static constexpr double kSame = 0.02, kTurned = 1e-7;
+
+  [[nodiscard]] double Unit(const Joint& joint, int c) const {
+    return IsLength(joint.kind, c) ? length_m_ : 1.0;
+  }
+
+  // Driven joints by the step, to where there is room; others anywhere near.
+  void Kick(std::mt19937_64* random, Mechanism* there) const {
+    std::uniform_real_distribution<double> uniform(-1.5 * kStep, 1.5 * kStep);
+    for (Joint& joint : there->joints) joint.guess = joint.home;
+    for (const int j : group_.joints) {
+      Joint& joint = there->joints[j];
+      for (int c = 0; c < DofsOf(joint.kind); ++c) {
+        const CoordinateRange& range = joint.range[c];
+        double step = kStep * Unit(joint, c);
+        if (HasLedCoordinate(home_, j)) {
+          const double up = range.upper - joint.home[c], down = joint.home[c] - range.lower;
+          if (up < 2.0 * step && down > up) step = -std::min(step, 0.5 * down);
+        } else {
+          step = uniform(*random) * Unit(joint, c);
+        }
+        joint.guess[c] = std::clamp(joint.home[c] + step, range.lower, range.upper);
+      }
+    }
+  }
+
+  [[nodiscard]] double Distance(const Mechanism& there, int j) const {
+    const Joint& joint = there.joints[j];
+    double sum = 0.0;
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
+      sum += std::pow((joint.home[c] - home_.joints[j].home[c]) / Unit(joint, c), 2);
+    }
+    return std::sqrt(sum);
+  }
+
+  // False where it is too far away to be the same assembly.
+  bool Measure(WayOn* way) const {
+    double sum = 0.0, most = 0.0;
+    for (const int j : group_.joints) {
+      const double distance = Distance(way->there, j);
+      sum += distance * distance;
+      most = std::max(most, distance);
+    }
+    way->moved = std::sqrt(sum / static_cast<double>(group_.joints.size()));
+    for (size_t b = 1; b < home_.bodies.size(); ++b) {
+      const Mat3 turned =
+          home_.X_WB_home[b].linear().transpose() * way->there.X_WB_home[b].linear();
+      way->translating += LogRotation(turned).norm() < kTurned ? 1 : 0;
+    }
+    return most < kFarthest;
+  }
+
+  [[nodiscard]] bool IsNew(const WayOn& way, const std::vector<WayOn>& ways) const {
+    return std::ranges::none_of(ways, [&](const WayOn& known) {
+      return std::ranges::all_of(group_.joints, [&](int j) {
+        const Joint &a = way.there.joints[j], &b = known.there.joints[j];
+        for (int c = 0; c < DofsOf(a.kind); ++c) {
+          if (std::abs(a.home[c] - b.home[c]) > kSame * Unit(a, c)) return false;
+        }
+        return true;
+      });
+    });
+  }
+
+  const Mechanism& home_;
+  const LoopGroup& group_;
+  const double length_m_;
+  const int dofs_;
+};
+
+// Home is moved by a step in which the first motion goes on.
+void LeaveSingularHome(Mechanism* mechanism, ModelReport* report) {
+  for (const LoopGroup& group : LoopGroups(*mechanism)) {
+    SingularHome home(*mechanism, group);
+    std::vector<WayOn> ways = home.Find();
+    if (ways.empty()) continue;
+    std::string others;
+    for (size_t w = 1; w < ways.size(); ++w) {
+      others += fmt::format("{}{}", w == 1 ? "; also: " : " | ", home.Text(ways[w].there));
+    }
+    const Joint& closure = mechanism->joints[group.closures.front()];
+    const std::string text = fmt::format(
+        "the home pose is singular: there the loops at '{}' can go on in several ways, as a "
+        "stretched parallelogram can, and have {} degrees of freedom instead of {}. It is left by "
+        "a small step in the way in which most links keep their orientation, then in that which "
+        "moves least: {}{}",
+        closure.name, CountDofs(*mechanism), CountDofs(ways.front().there),
+        home.Text(ways.front().there), others);
+    *mechanism = std::move(ways.front().there);
+    report->AtJoint(static_cast<size_t>(group.closures.front()), Severity::kWarning, text,
+                    "a keyframe, or guesses in a model file, state another pose");
+  }
+}
+
 }  // namespace
 
 void CloseLoops(const ClosureRules& given, Mechanism* mechanism, ModelReport* report) {
@@ -679,6 +828,7 @@ void CloseLoops(const ClosureRules& given, Mechanism* mechanism, ModelReport* re
     } else if (home.drives_moved) {
       WarnAboutMovedDrives(*mechanism, report);
     }
+    if (rules.is_robot) LeaveSingularHome(mechanism, report);
     return;
   }
   const double gap_m = home.gap * CharacteristicLength(*mechanism);

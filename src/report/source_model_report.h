@@ -66,6 +66,9 @@ struct SourceModelAudit {
   SourceModelError as_is;
   std::vector<SourceModelCause> causes;
   SourceModelError corrected;  ///< all causes at once
+  /// The same with loops ten times softer than MuJoCo's limit, where `corrected` is not good: what
+  /// the limit itself costs.
+  SourceModelError softer;
   /// As the file, with its drives led exactly and without what the reference does not have: what
   /// its settings alone do. Only where `as_is` is not good.
   SourceModelError bare;

@@ -1,4 +1,5 @@
 #include "features/logs/log_columns.h"
+#include "mechanism/reach.h"
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -828,6 +829,7 @@ std::vector<LogAxis> LogAxes(const Mechanism& mechanism) {
     axis.names = {named.name};
     axis.unit = CoordinateUnit(mechanism, named.coordinate);
     axis.force_unit = axis.unit == "m" ? "N" : "N m";
+    axis.size = axis.unit == "m" ? CharacteristicLength(mechanism) : 1.0;
     const auto index = static_cast<size_t>(named.coordinate.index);
     switch (named.coordinate.kind) {
       case Coordinate::Kind::kDrive: {

@@ -25,6 +25,7 @@ struct LogAxis {
   std::string unit;                ///< "m" or "rad"
   std::string force_unit;          ///< "N" or "N m"
   CoordinateRange range;
+  double size = 1.0;  ///< of its way: 1 rad, or the robot's characteristic length [m]
 
   [[nodiscard]] const std::string& name() const { return names.front(); }
   [[nodiscard]] bool driven() const { return coordinate.kind != Coordinate::Kind::kJoint; }

@@ -12,7 +12,7 @@ using Kind = LogTerm::Kind;
 constexpr size_t kFewestFitRows = 30;
 constexpr size_t kScanRows = 2000;      // by which the delay is searched for
 constexpr int kMostLags = 400;          // on either side
-constexpr double kRests = 1e-6;         // [rad or m] of a drive that holds still
+constexpr double kRests = 1e-6;         // of the way's size, of a drive that holds still
 constexpr double kNearRest = 0.01;      // of the fastest rate: the sign is not known there
 constexpr double kChanges = 1e-4;       // of the log, by the longest delay
 constexpr double kAlike = 1e-3;         // what is left of a column that others explain
@@ -80,7 +80,7 @@ class LogFitter {
     for (const double t : force_.time_s) {
       fastest = std::max(fastest, std::abs(Evaluate(*force_.velocity, t).value));
     }
-    moves_ = fastest * force_.end_s > kRests;
+    moves_ = fastest * force_.end_s > kRests * force_.size;
     const auto rate = [&](double t) { return Evaluate(*force_.velocity, t - delay_s).value; };
     rows_.clear();
     double d2 = 0.0;

@@ -28,6 +28,7 @@ struct LogForce {
   const Piecewise* model = nullptr;     ///< m
   const Piecewise* velocity = nullptr;  ///< v and, as its rate, a
   double end_s = 0.0;                   ///< the model is known on 0 … end_s
+  double size = 1.0;                    ///< LogAxis::size of the drive
 };
 
 /// A number of the fit.

@@ -152,7 +152,8 @@ class LogComparer {
                               .log = result.log,
                               .model = &model,
                               .velocity = &rate,
-                              .end_s = end_s},
+                              .end_s = end_s,
+                              .size = axis.size},
                              most_delay_s_);
     result_.drives.push_back(std::move(result));
   }

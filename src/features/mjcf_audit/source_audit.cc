@@ -672,6 +672,11 @@ class Auditor {
     const double steps = 2.0 * static_cast<double>(rows.size()) + 2.0;
     double step = 0.0;
     audit_.corrected = Try(all);
+    if (audit_.corrected.sound() && !audit_.Good(audit_.corrected)) {
+      SourceModelSettings softer = all;
+      softer.impedance = 1.0 - 10.0 * (1.0 - kMjcfImpedance);
+      audit_.softer = Try(softer);
+    }
     for (const CauseRow* row : rows) {
       SourceModelSettings without, alone;
       row->correct(facts, &without);

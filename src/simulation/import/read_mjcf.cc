@@ -24,11 +24,41 @@ ModelHandle Compile(mjcf::ForeignMjcf* foreign) {
   return model;
 }
 
+// What MuJoCo 3 takes by default: pyramids from the surface's centre to its faces, all counted as
+// positive; exact where all are seen from there. By mesh [m³].
+std::map<std::string, double> MeshVolumes(const mjModel& m) {
+  std::map<std::string, double> volumes;
+  for (int mesh = 0; mesh < m.nmesh; ++mesh) {
+    const float* vertices = m.mesh_vert + 3 * m.mesh_vertadr[mesh];
+    const int* faces = m.mesh_face + 3 * m.mesh_faceadr[mesh];
+    const auto corner = [&](int face, int k) {
+      return Vec3(
+          Eigen::Map<const Eigen::Vector3f>(vertices + 3 * faces[3 * face + k]).cast<double>());
+    };
+    Vec3 centre = Vec3::Zero();
+    double area = 0.0, volume = 0.0;
+    for (int f = 0; f < m.mesh_facenum[mesh]; ++f) {
+      const Vec3 a = corner(f, 0), b = corner(f, 1), c = corner(f, 2);
+      const double of_face = 0.5 * (b - a).cross(c - a).norm();
+      area += of_face;
+      centre += of_face * (a + b + c) / 3.0;
+    }
+    if (area > 0.0) centre /= area;
+    for (int f = 0; f < m.mesh_facenum[mesh]; ++f) {
+      const Vec3 a = corner(f, 0) - centre, b = corner(f, 1) - centre, c = corner(f, 2) - centre;
+      volume += std::abs(a.cross(b).dot(c)) / 6.0;
+    }
+    if (const char* name = mj_id2name(&m, mjOBJ_MESH, mesh)) volumes.emplace(name, volume);
+  }
+  return volumes;
+}
+
 ImportedMjcf Import(mjcf::ForeignMjcf* source, const std::string& file, const FloatingBase& base,
                     Diagnostics* diagnostics) {
   const mjcf::ForeignMjcf& foreign = *source;
   ImportedMjcf imported;
   imported.model = Compile(source);
+  if (source->StateMeshMasses(MeshVolumes(*imported.model))) imported.model = Compile(source);
   imported.text = foreign.Text();
   imported.printed = RoundingOf(imported.text);
   const mjModel& m = *imported.model;

@@ -262,6 +262,14 @@ struct ForeignMjcf::Impl {
       Add(Severity::kWarning, 0, fmt::format("{} meshes are left out of the pictures", geoms.lost),
           "meshes of files in the model's folder or below are drawn");
     }
+    for (const MeshGeoms::Missing& missing : geoms.missing) {
+      Add(Severity::kError, missing.line,
+          fmt::format("body '{}' states no inertia: it is that of mesh file '{}', which is not in "
+                      "the model's folder",
+                      missing.body, missing.file),
+          "put the file there, or write <inertial pos=… mass=… diaginertia=…/> into the body; of "
+          "geoms that are for pictures only, mass=\"0\"");
+    }
     std::vector<XMLElement*> others;
     std::set<std::string> bodies{"world"};
     ForEach(root(), [&](XMLElement* e) {
@@ -644,6 +652,31 @@ ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnost
 ForeignMjcf::~ForeignMjcf() = default;
 
 bool ForeignMjcf::ok() const { return impl_->good; }
+
+bool ForeignMjcf::StateMeshMasses(const std::map<std::string, double>& volumes) {
+  const char* exact = impl_->Compiler()->Attribute("exactmeshinertia");
+  if (exact != nullptr && std::string_view(exact) == "true") return false;
+  bool any = false;
+  ForEach(impl_->root(), [&](XMLElement* e) {
+    const auto* body = e->Parent()->ToElement();
+    const bool in_body = body != nullptr && (IsTag(body, "body") || IsTag(body, "worldbody"));
+    if (!in_body || !IsTag(e, "geom") || e->Attribute("mesh") == nullptr) return;
+    const char* type = mjcf::Inherited(e, "type");
+    const char* shell = mjcf::Inherited(e, "shellinertia");
+    const bool solid = shell == nullptr || std::string_view(shell) != "true";
+    const auto volume = volumes.find(e->Attribute("mesh"));
+    if (volume == volumes.end() || mjcf::Inherited(e, "mass") != nullptr || !solid ||
+        (type != nullptr && std::string_view(type) != "mesh")) {
+      return;
+    }
+    const char* density = mjcf::Inherited(e, "density");
+    const double mass =
+        (density == nullptr ? 1000.0 : std::strtod(density, nullptr)) * volume->second;
+    e->SetAttribute("mass", fmt::format("{}", mass).c_str());
+    any = true;
+  });
+  return any;
+}
 
 std::string ForeignMjcf::Text() const {
   tinyxml2::XMLPrinter printer;

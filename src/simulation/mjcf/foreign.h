@@ -63,6 +63,11 @@ class ForeignMjcf {
   /// What acts on forces and is left out, as the text alone shows; findings name it, too.
   [[nodiscard]] const std::vector<ModelCaveat>& left_out() const;
 
+  /// Writes the masses of mesh geoms that state a density only, or nothing: MuJoCo 2.2 gets their
+  /// volumes wrong by some percent unless it computes them exactly (exactmeshinertia). `volumes`:
+  /// by mesh [m³]. False if there is nothing to write.
+  [[nodiscard]] bool StateMeshMasses(const std::map<std::string, double>& volumes);
+
   /// Writes the keyframes of attached models: `reference` is the pose of the whole without any,
   /// `address` is where a joint's coordinates begin in it. False if there are none.
   [[nodiscard]] bool PlaceKeyframes(const std::vector<double>& reference,

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <array>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <locale>
 #include <numbers>
 #include <optional>
@@ -438,8 +440,7 @@ class MeshTaker {
     for (XMLElement* geom : geoms) {
       const char* type = geom->Attribute("type");
       const XMLElement* body = geom->Parent()->ToElement();
-      const bool states_inertia =
-          IsTag(body, "worldbody") || body->FirstChildElement("inertial") != nullptr;
+      const bool states_inertia = IsTag(body, "worldbody") || StatesInertia(body);
       const auto asset = assets.find(geom->Attribute("mesh"));
       // Others are primitives that are fitted to a mesh.
       const bool shown = type == nullptr || std::string_view(type) == "mesh";
@@ -448,13 +449,64 @@ class MeshTaker {
       } else if (states_inertia) {
         ++result_.lost;
       }
-      if (states_inertia) document_.DeleteNode(geom);
+      if (states_inertia || HasNoMass(geom)) {
+        document_.DeleteNode(geom);
+      } else {
+        FindFile(geom, *body);
+      }
     }
     return std::move(result_);
   }
 
  private:
   XMLElement* root() { return document_.RootElement(); }
+
+  [[nodiscard]] const char* OfCompiler(const char* attribute) {
+    const XMLElement* compiler = root()->FirstChildElement("compiler");
+    return compiler == nullptr ? nullptr : compiler->Attribute(attribute);
+  }
+
+  // <inertial> counts unless the compiler takes geoms instead.
+  [[nodiscard]] bool StatesInertia(const XMLElement* body) {
+    const char* from_geom = OfCompiler("inertiafromgeom");
+    return body->FirstChildElement("inertial") != nullptr &&
+           (from_geom == nullptr || std::string_view(from_geom) != "true");
+  }
+
+  // A geom for pictures or touch alone, by its mass, density or group.
+  [[nodiscard]] bool HasNoMass(const XMLElement* geom) {
+    const auto number = [&](const char* attribute, double fallback) {
+      const char* text = Inherited(geom, attribute);
+      return text == nullptr ? fallback : std::strtod(text, nullptr);
+    };
+    double first = 0.0, last = 5.0;  // groups that count
+    if (const char* range = OfCompiler("inertiagrouprange")) {
+      std::istringstream(range) >> first >> last;
+    }
+    const double group = number("group", 0.0);
+    if (group < first || group > last) return true;
+    return Inherited(geom, "mass") != nullptr ? number("mass", 1.0) == 0.0
+                                              : number("density", 1000.0) == 0.0;
+  }
+
+  // Notes a mesh whose file is not there.
+  void FindFile(const XMLElement* geom, const XMLElement& body) {
+    ForEach(root(), [&](XMLElement* e) {
+      const auto* parent = e->Parent()->ToElement();
+      const char* file = e->Attribute("file");
+      if (!IsTag(e, "mesh") || file == nullptr || parent == nullptr || !IsTag(parent, "asset")) {
+        return;
+      }
+      const char* name = e->Attribute("name");
+      const std::string known = name == nullptr ? fs::path(file).stem().string() : name;
+      std::error_code error;
+      if (known != geom->Attribute("mesh") || fs::exists(folder_ / file, error)) return;
+      const char* of_body = body.Attribute("name");
+      result_.missing.push_back({.line = geom->GetLineNum(),
+                                 .body = of_body == nullptr ? "without a name" : of_body,
+                                 .file = file});
+    });
+  }
 
   // A sphere where a geom is. Its pose may be written in many ways, and come from its class.
   void PutSphere(XMLElement* geom, const ForeignMesh& mesh) {

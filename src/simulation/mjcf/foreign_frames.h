@@ -52,6 +52,12 @@ struct FrameTrouble {
 struct MeshGeoms {
   std::map<std::string, ForeignMesh> meshes;  ///< by the name of the sphere in the geom's place
   int lost = 0;                               ///< geoms that went without one
+  /// Bodies whose inertia is that of meshes whose files are not there.
+  struct Missing {
+    int line = 0;  ///< of the geom
+    std::string body, file;
+  };
+  std::vector<Missing> missing = {};
 };
 
 /// Puts a sphere of no mass where a geom shows a mesh of a file that `is_open` allows, and removes

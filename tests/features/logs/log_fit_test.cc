@@ -144,6 +144,18 @@ TEST_F(LogFitTest, LeavesOutWhatTheMotionDoesNotTell) {
   EXPECT_TRUE(fit.term(Kind::kGain).fitted);
   EXPECT_NEAR(fit.term(Kind::kGain).value, 1.1, 1e-6);
   EXPECT_FALSE(fit.term(Kind::kInertia).fitted);
+  // What holds still is so by its size: a way of a micron is one of a robot of a millimetre.
+  const Piecewise tiny = SplineOf([](double t) { return 1e-7 * Acceleration(t); });
+  double fastest = 0.0;
+  for (int i = 0; i * kStep <= kEnd + 1e-9; ++i) {
+    fastest = std::max(fastest, 1e-7 * std::abs(Acceleration(i * kStep)));
+  }
+  LogForce small = force;
+  small.velocity = &tiny;
+  for (const double more : {0.5, 2.0}) {
+    small.size = more * fastest * kEnd / 1e-6;
+    EXPECT_EQ(FitLogForce(small, 0.05).term(Kind::kViscous).fitted, more < 1.0) << more;
+  }
   // Nothing moves: friction, delay and inertia say nothing.
   const Piecewise still = SplineOf([](double) { return 0.0; });
   const Piecewise weight = SplineOf([](double) { return 3.0; });
