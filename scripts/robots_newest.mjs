@@ -1,10 +1,12 @@
-// How MJCF files are imported, held against the newest MuJoCo (npm's @mujoco/mujoco) on the files as
-// they are:
+// How MJCF and URDF files are imported, held against the newest MuJoCo (npm's @mujoco/mujoco) on the
+// files as they are:
 //
 //   node scripts/robots_newest.mjs MBVERIFY FOLDER…
 //
-// mbverify imports every MJCF file below the folders and runs its first motion; the newest MuJoCo
-// compiles the original. Compared are masses, centres of mass and inertias, poses at home, and the
+// mbverify imports every such file below the folders and runs its first motion; the newest MuJoCo
+// compiles the original. It reads URDF files as trees, whose root is the world, and without mimics:
+// of these the mass of all that moves is compared instead of each body's, as frames without mass
+// are parts of other bodies here. Compared are masses, centres of mass and inertias, poses at home, and the
 // drive forces at rest at home (gravity) and along the motion. MuJoCo closes the loops itself:
 //
 //   r(q) = 0, q_d = x;  J q̇ = (0, ẋ);  J q̈ = (−J̇q̇, ẍ)                                         (1)
@@ -145,6 +147,20 @@ export class Robot {
     return worst;
   }
 
+  /** The mass of all that moves, relative, instead: [value, where]. */
+  compareMoving() {
+    const {model, mechanism} = this, still = new Set(['world']);
+    for (let before = 0; before < still.size;) {
+      before = still.size;
+      for (const joint of mechanism.joints) {
+        if (joint.kind === 'fixed' && still.has(joint.parent.body)) still.add(joint.child.body);
+      }
+    }
+    const here = sum(mechanism.bodies.filter((body) => !still.has(body.name)).map((body) => body.mass));
+    const there = sum(Array.from(model.body_mass).filter((_, id) => model.body_weldid[id] !== 0));
+    return [Math.abs(here - there) / there, 'in all'];
+  }
+
   /** Puts MuJoCo into the mechanism's home pose. */
   goHome() {
     const {mj, model, mechanism, data} = this, type = mj.mjtJoint;
@@ -253,6 +269,12 @@ function tetrahedron() {
   return bytes;
 }
 
+const isUrdf = (file) => file.endsWith('.urdf');
+
+/** A URDF file without shapes, every link of which is a body of MuJoCo. */
+export const bareUrdf = (text) => text.replace(/<!--[^]*?-->/g, '').replace(/<(visual|collision)\b[^>]*?(\/>|>[^]*?<\/\1>)/g, '')
+    .replace(/<robot\b[^>]*>/, (open) => `${open}<mujoco><compiler fusestatic="false" discardvisual="true" balanceinertia="false"/></mujoco>`);
+
 /** Compiles a file with what lies in its folder; `change`: of its text. */
 function compileFile({mj}, file, change) {
   const folder = path.dirname(file), vfs = new mj.MjVFS();
@@ -267,7 +289,7 @@ function compileFile({mj}, file, change) {
     const whole = path.join(folder, name);
     if (fs.statSync(whole).isFile() && /\.(xml|stl|obj|msh|skn|png)$/i.test(name)) vfs.addBuffer(name, fs.readFileSync(whole));
   }
-  const spec = mj.parseXMLString(text, vfs);
+  const spec = mj.parseXMLString(isUrdf(file) ? bareUrdf(text) : text, vfs);
   return mj.mj_compile(spec, vfs);
 }
 
@@ -293,7 +315,9 @@ export function checkFile(engine, program, file, scratch, change = (text) => tex
   const mechanism = JSON.parse(run('model', setup, '--format', 'mechanism'));
   row.notes = [...fs.readFileSync(setup, 'utf8').matchAll(/^ {2}- "?(.*? is left out.*?)"?$/gm)].map((match) => match[1]);
   const robot = new Robot(engine, compileFile(engine, file, change), mechanism);
-  Object.assign(row, robot.compareBodies());
+  if (isUrdf(file) && mechanism.joints.some((joint) => joint.closure)) return {...row, refused: 'MuJoCo reads no loops of URDF files'};
+  if (isUrdf(file) && mechanism.couplings.length > 0) return {...row, refused: 'MuJoCo reads no mimics of URDF files'};
+  Object.assign(row, isUrdf(file) ? {mass: robot.compareMoving(), centre: [0, ''], inertia: [0, '']} : robot.compareBodies());
   robot.goHome();
   row.poses = robot.comparePoses();
   const counts = {bodies: mechanism.bodies.length - 1, drives: robot.drives.length, closures: mechanism.joints.filter((joint) => joint.closure).length};
@@ -342,7 +366,7 @@ async function main([program, ...folders]) {
   console.log(`MuJoCo ${engine.version}\n`);
   console.log('| file | bodies | loops | drives | mass | centre | inertia | poses | gravity | moving | left out, or why not |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|');
   for (const folder of folders) {
-    const files = fs.statSync(folder).isFile() ? [folder] : fs.readdirSync(folder, {recursive: true}).filter((name) => name.endsWith('.xml')).sort().map((name) => path.join(folder, name));
+    const files = fs.statSync(folder).isFile() ? [folder] : fs.readdirSync(folder, {recursive: true}).filter((name) => name.endsWith('.xml') || name.endsWith('.urdf')).sort().map((name) => path.join(folder, name));
     for (const file of files) {
       let row;
       try {

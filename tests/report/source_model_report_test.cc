@@ -54,6 +54,28 @@ TEST(SourceModelReport, WhatStaysWithAllMendedIsNotAMatterOfSettings) {
   EXPECT_EQ(CauseSentence(audit).find("another mechanism"), std::string::npos);
   audit.corrected.force = 0.05;
   EXPECT_NE(CauseSentence(audit).find("5 % of the force stays wrong"), std::string::npos);
+  // Unless it grows with softness.
+  for (const double softer : {0.049, 0.099, 0.101, 0.4}) {
+    audit.softer = Sound(softer, 1e-5);
+    const std::string text = CauseSentence(audit);
+    EXPECT_EQ(text.find("still give way") != std::string::npos, softer > 0.1) << softer;
+    EXPECT_EQ(text.find("another mechanism") != std::string::npos, softer < 0.1) << softer;
+  }
+}
+
+TEST(SourceModelReport, ThePastedLinesAreQuotedAsAUserRunsThem) {
+  SourceModelAudit audit = Example();
+  audit.lines = "<option timestep=\"0.001\"/>\n";
+  audit.pasted = Sound(1e-3, 1e-5);
+  audit.pasted_as_is = Sound(0.07, 1e-5);
+  audit.causes.push_back({.key = "drives", .title = "drives that lag", .meaning = "Servos."});
+  const std::string html = ToHtml(SourceModelSection(audit, false));
+  EXPECT_NE(html.find("1.00e-03"), std::string::npos);
+  EXPECT_NE(html.find("nothing else changed: force error 7.00e-02"), std::string::npos);
+  EXPECT_NE(html.find("what settings of loops leave: drives that lag"), std::string::npos);
+  audit.pasted_as_is = Sound(0.002, 1e-5);
+  EXPECT_EQ(ToHtml(SourceModelSection(audit, false)).find("what settings of loops leave"),
+            std::string::npos);
 }
 
 TEST(SourceModelReport, GoodNeedsForcesAndLoops) {

@@ -145,10 +145,10 @@ TEST_F(LogFitTest, LeavesOutWhatTheMotionDoesNotTell) {
   EXPECT_NEAR(fit.term(Kind::kGain).value, 1.1, 1e-6);
   EXPECT_FALSE(fit.term(Kind::kInertia).fitted);
   // What holds still is so by its size: a way of a micron is one of a robot of a millimetre.
-  const Piecewise tiny = SplineOf([](double t) { return 1e-7 * Acceleration(t); });
+  const Piecewise tiny = SplineOf([](double t) { return 1e-7 * Velocity(t); });
   double fastest = 0.0;
   for (int i = 0; i * kStep <= kEnd + 1e-9; ++i) {
-    fastest = std::max(fastest, 1e-7 * std::abs(Acceleration(i * kStep)));
+    fastest = std::max(fastest, 1e-7 * std::abs(Velocity(i * kStep)));
   }
   LogForce small = force;
   small.velocity = &tiny;

@@ -118,6 +118,20 @@ TEST_F(SourceModelAudits, SoftLoopsOpenAreNamedAndMendedByTheLines) {
   EXPECT_NEAR(pasted.as_is.force, promised.force, 1e-9 * promised.force) << audit.lines;
   EXPECT_NEAR(pasted.as_is.gap_m, promised.gap_m, 1e-9 * promised.gap_m);
   EXPECT_TRUE(pasted.Good(pasted.as_is));
+  EXPECT_NEAR(audit.pasted_as_is.force, pasted.as_is.force, 1e-9 * promised.force);
+  EXPECT_NEAR(audit.pasted_as_is.gap_m, pasted.as_is.gap_m, 1e-9 * promised.gap_m);
+}
+
+// The lines cannot make a servo follow: what a user gets is another number than what they promise.
+TEST_F(SourceModelAudits, TheLinesAreRunWithTheFilesOwnServosToo) {
+  const std::string text = Text(
+      {.head = kSoft,
+       .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"});
+  const SourceModelAudit audit = Audit(text);
+  ASSERT_GT(audit.recommended, 0);
+  const SourceModelAudit pasted = Audit(mjcf::WithLines(text, audit.lines));
+  EXPECT_NEAR(audit.pasted_as_is.force, pasted.as_is.force, 1e-9 * pasted.as_is.force);
+  EXPECT_GT(audit.pasted_as_is.force, 2.0 * audit.pasted.force);
 }
 
 TEST_F(SourceModelAudits, ClosuresWithSettingsOfTheirOwnAreNamed) {
