@@ -124,9 +124,9 @@ TEST_F(SourceModelAudits, SoftLoopsOpenAreNamedAndMendedByTheLines) {
 
 // The lines cannot make a servo follow: what a user gets is another number than what they promise.
 TEST_F(SourceModelAudits, TheLinesAreRunWithTheFilesOwnServosToo) {
-  const std::string text = Text(
-      {.head = kSoft,
-       .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"});
+  const std::string text =
+      Text({.head = kSoft,
+            .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"});
   const SourceModelAudit audit = Audit(text);
   ASSERT_GT(audit.recommended, 0);
   const SourceModelAudit pasted = Audit(mjcf::WithLines(text, audit.lines));
