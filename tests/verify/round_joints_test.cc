@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "math/spatial.h"
+#include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
 #include "simulation/engine/simulation.h"
 #include "tests/reference/fixture.h"
@@ -226,6 +227,27 @@ TEST(RoundJoints, TheWrittenModelIsTheSame) {
     ASSERT_EQ(again.mechanism->elements.size(), m.elements.size());
     const auto forces = [](const Mechanism& of) { return RunReference(of, Wobble(of)).trace; };
     EXPECT_LT(Difference(forces(m), forces(*again.mechanism), m), 1e-12);
+  }
+}
+
+// A ball with forces is a closure beside a free joint there.
+TEST(RoundJoints, TheUrdfFileWithItsCompanionIsTheSame) {
+  for (const bool free : {false, true}) {
+    const test::TestFolder folder("round_joints_urdf");
+    const Mechanism m = Loaded({}, free);
+    const std::string file = folder.Write("plate.urdf", WriteUrdf(m));
+    folder.Write("plate.mbverify.yaml", WriteUrdfCompanion(m, "plate.urdf"));
+    const LoadResult again = LoadRobot(file);
+    ASSERT_TRUE(again.mechanism) << again.diagnostics.Text();
+    EXPECT_EQ(again.mechanism->elements.size(), m.elements.size());
+    const auto forces = [](const Mechanism& of) { return RunReference(of, Wobble(of)).trace; };
+    const Trace a = forces(m), b = forces(*again.mechanism);
+    for (const Drive& drive : m.drives) {
+      const VecX truth = fixtures::ColumnOf(a, drive.name + ".force");
+      EXPECT_LT((fixtures::ColumnOf(b, drive.name + ".force") - truth).cwiseAbs().maxCoeff(),
+                1e-9 * truth.cwiseAbs().maxCoeff())
+          << drive.name;
+    }
   }
 }
 

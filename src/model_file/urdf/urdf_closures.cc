@@ -693,6 +693,9 @@ class Companion {
       }
       if (n > 0) line += ", guess: [" + guess + "]";
       if (limited) line += ", range: [" + range + "]";
+      if (std::isfinite(joint.max_rotation)) {
+        line += fmt::format(", range: [0, {}]", joint.max_rotation);
+      }
       if (joint.transmits_force_only) line += ", transmits: force";
       sections_["joints"] += line + ", closure: true}\n";
     }
@@ -788,10 +791,10 @@ class Companion {
       const RotorAxis& axis = *std::get<RotorLaw>(element.law).carrier;
       Pose X = Pose::Identity();
       X.linear() = LeastRotation(Vec3::UnitZ(), axis.axis_B);
-      const std::string frame = Attach(axis.body, YamlName(element.name) + "_axis", X);
+      const std::string frame = Attach(axis.body, YamlName(FileName(m_, element)) + "_axis", X);
       place += CarrierText({.body = axis.body, .axis_B = Vec3::UnitZ()}, frame);
     }
-    sections_["elements"] += fmt::format("  {}: {{{}}}\n", YamlName(element.name),
+    sections_["elements"] += fmt::format("  {}: {{{}}}\n", YamlName(FileName(m_, element)),
                                          ElementText(element, place, ActsOnLength(m_, element)));
   }
 

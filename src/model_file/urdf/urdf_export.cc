@@ -145,13 +145,41 @@ std::string JointText(const Mechanism& mechanism, int tree_index,
 
 }  // namespace
 
+namespace {
+
+// What acts on a ball's rotation has no place in three hinges: a free joint carries the body, and
+// the ball is a closure beside it.
+void CutBallsWithForces(Mechanism* m) {
+  for (size_t t = 0; t < m->tree_joints.size(); ++t) {
+    const int j = m->tree_joints[t];
+    Joint& ball = m->joints[static_cast<size_t>(j)];
+    const bool acts = std::ranges::any_of(
+        m->elements, [j](const ForceElement& element) { return element.joint == j; });
+    if (ball.kind != JointKind::kSpherical || (!acts && std::isinf(ball.max_rotation))) continue;
+    Joint free;
+    free.name = ball.name + ".free";
+    free.kind = JointKind::kFree;
+    free.parent = ball.parent;
+    free.X_PF = ball.X_PF;
+    free.child = ball.child;
+    free.X_CM = ball.X_CM;
+    free.home = free.guess = CoordinatesOf(free, JointPose(ball, ball.home));
+    ball.closure = true;
+    m->tree_joints[t] = static_cast<int>(m->joints.size());
+    m->joints.push_back(std::move(free));
+  }
+}
+
+}  // namespace
+
 Mechanism WithBallsAtZero(const Mechanism& mechanism) {
   Mechanism straight = mechanism;
-  std::vector<bool> named(mechanism.joints.size(), false);  // by drives: their zero is meant
+  CutBallsWithForces(&straight);
+  std::vector<bool> named(straight.joints.size(), false);  // by drives: their zero is meant
   for (const Drive& drive : mechanism.drives) {
     if (const auto* on = std::get_if<JointDrive>(&drive.kind)) named[size_t(on->joint)] = true;
   }
-  for (const int index : mechanism.tree_joints) {
+  for (const int index : straight.tree_joints) {
     Joint& joint = straight.joints[size_t(index)];
     const bool limited = std::any_of(
         joint.range.begin(), joint.range.begin() + 3,

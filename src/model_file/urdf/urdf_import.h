@@ -98,7 +98,8 @@ struct UrdfStep {
 
 /// The mechanism with the frames of its balls turned so that their coordinates are zero at home. A
 /// ball of the tree becomes three hinges, which lose a DOF where the middle one is at 90
-/// degrees: from home, they are the farthest from there. Balls with limits stay as they are.
+/// degrees: from home, they are the farthest from there. Balls with limits stay as they are; those
+/// with forces of their own, or a largest rotation, become closures beside a free joint.
 [[nodiscard]] Mechanism WithBallsAtZero(const Mechanism& mechanism);
 
 /// The chain, inboard first. `reversed`: the tree runs from the child to the parent.
