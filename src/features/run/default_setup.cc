@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/text.h"
 #include "kinematics/command_rank.h"
@@ -63,43 +64,56 @@ Drive DriveOn(const Mechanism& m, const Coordinate& coordinate) {
   return drive;
 }
 
-// A ball becomes a universal joint that does not turn about a direction at home.
-void HoldAbout(const Vec3& n_W, const Mechanism& m, Joint* joint) {
+// A ball becomes a universal joint that does not turn about a direction at home. Its axes stay at
+// right angles, so that damping and rotors of its rotation are the same along both coordinates;
+// friction is limited about these axes instead of the child's.
+void HoldAbout(const Vec3& n_W, int ball, Mechanism* m) {
   Mat3 E;
   E.col(2) = n_W.normalized();
   E.col(0) = E.col(2).unitOrthogonal();
   E.col(1) = E.col(2).cross(E.col(0));
-  joint->kind = JointKind::kUniversal;
-  joint->axis = Vec3::UnitX();
-  joint->axis2 = Vec3::UnitY();
-  joint->X_PF.linear() = m.X_WB_home[joint->parent].linear().transpose() * E;
-  joint->X_CM.linear() = m.X_WB_home[joint->child].linear().transpose() * E;
-  joint->guess = joint->home = {};
-  joint->range = {};
+  Joint& joint = m->joints[static_cast<size_t>(ball)];
+  joint.kind = JointKind::kUniversal;
+  joint.axis = Vec3::UnitX();
+  joint.axis2 = Vec3::UnitY();
+  joint.X_PF.linear() = m->X_WB_home[joint.parent].linear().transpose() * E;
+  joint.X_CM.linear() = m->X_WB_home[joint.child].linear().transpose() * E;
+  joint.guess = joint.home = {};
+  joint.range = {};
+  joint.max_rotation = std::numeric_limits<double>::infinity();
+  std::erase_if(m->elements, [ball](const ForceElement& element) {
+    return element.joint == ball && element.coordinate == 2;
+  });
 }
 
 // A ball that turns in this motion is held about it; false without one.
 bool HoldTurn(const std::vector<Vec6>& motion, Mechanism* m) {
-  for (Joint& joint : m->joints) {
+  for (size_t j = 0; j < m->joints.size(); ++j) {
+    const Joint& joint = m->joints[j];
     if (joint.kind != JointKind::kSpherical) continue;
     const Vec3 turn = motion[joint.child].head<3>() - motion[joint.parent].head<3>();
     if (turn.norm() < 1e-3) continue;
-    HoldAbout(turn, *m, &joint);
+    HoldAbout(turn, static_cast<int>(j), m);
     return true;
   }
   return false;
 }
 
 // Rods between two balls that are not quite symmetric about their lines, where nothing but their
-// spins is left free: in a robot friction holds them, and here one of their balls does.
+// spins is left free: in a robot friction holds them, and here one of their balls does, if
+// there is one whose rotation no force acts on.
 std::vector<ModelCaveat> HoldUnevenSpins(size_t free, Mechanism* m) {
   std::vector<Spin> spins = FindSpins(*m);
   std::erase_if(spins, [](const Spin& spin) { return spin.why_not.empty(); });
   if (spins.size() != free) return {};
+  const auto is_bare = [m](int ball) {
+    return std::ranges::none_of(
+        m->elements, [ball](const ForceElement& element) { return element.joint == ball; });
+  };
   std::vector<std::string> names;
   for (const Spin& spin : spins) {
     const Vec3 n_W = m->X_WB_home[static_cast<size_t>(spin.bodies[0])].linear() * spin.n_B;
-    HoldAbout(n_W, *m, &m->joints[static_cast<size_t>(spin.balls[0])]);
+    HoldAbout(n_W, is_bare(spin.balls[1]) ? spin.balls[1] : spin.balls[0], m);
     names.push_back(spin.name);
   }
   return {
