@@ -6,9 +6,11 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <regex>
 #include <utility>
 #include <vector>
 
+#include "base/files.h"
 #include "features/robots/survey.h"
 #include "features/run/default_setup.h"
 #include "kinematics/mobility.h"
@@ -712,6 +714,37 @@ TEST(MjcfImport, MeshesHaveTheMassOfTheirVolume) {
   EXPECT_NEAR(body.mass, 1000.0 * 7.0 / 3.0, 1e-7 * body.mass);
   EXPECT_NEAR(body.p_BoBcm_B.z(), 11.0 / 28.0, 1e-7);
   EXPECT_LT(body.p_BoBcm_B.head<2>().norm(), 1e-7);
+}
+
+// A wrist on three rods, whose balls at the cranks have forces. The spins are held by the balls at
+// the plate, where nothing acts, and the forces at the cranks stay.
+TEST(MjcfImport, SpinsOfRodsAreHeldWhereNoForceActs) {
+  const test::TestFolder folder("mjcf_rods");
+  const std::string wrist =
+      ReadWholeFile(SourcePath("/tests/web/robots/ball_wrist.xml")).value_or("");
+  const auto on_rods = [&](const std::string& of_ball) {
+    const std::regex hinges(
+        R"re(<joint name="u(\d)" axis="1 0 0"/><joint name="v\d" axis="0 1 0"/>)re");
+    return std::regex_replace(wrist, hinges, "<joint name=\"b$1\" type=\"ball\" " + of_ball + "/>");
+  };
+  // Elements that are left on a ball.
+  const auto count_forces = [&](const std::string& of_ball) {
+    const std::string file = folder.Write("robot.xml", on_rods(of_ball));
+    const SurveyRow row = SurveyFile(file, folder.PathOf("scratch"));
+    EXPECT_EQ(row.status, "ok") << of_ball << row.message;
+    EXPECT_LT(row.inverse_nrmse, 1e-10);
+    EXPECT_LT(row.forward_nrmse, 1e-6);
+    const DefaultSetupResult made = MakeDefaultSetup(file, "rods", "model.yaml");
+    EXPECT_TRUE(made.setup) << made.diagnostics.Text();
+    const Mechanism& m = made.setup->mechanism;
+    EXPECT_EQ(m.joints[m.FindJoint("b0")].kind, JointKind::kSpherical);
+    EXPECT_EQ(m.joints[m.FindJoint("tip0")].kind, JointKind::kUniversal);
+    return static_cast<int>(std::ranges::count_if(m.elements, [&](const ForceElement& element) {
+      return element.joint == m.FindJoint("b0");
+    }));
+  };
+  EXPECT_EQ(count_forces(""), 0);
+  EXPECT_EQ(count_forces(R"(damping="0.03" armature="0.001" frictionloss="0.005")"), 9);
 }
 
 }  // namespace
