@@ -113,7 +113,8 @@ std::vector<ModelCaveat> HoldUnevenSpins(size_t free, Mechanism* m) {
   std::vector<std::string> names;
   for (const Spin& spin : spins) {
     const Vec3 n_W = m->X_WB_home[static_cast<size_t>(spin.bodies[0])].linear() * spin.n_B;
-    HoldAbout(n_W, is_bare(spin.balls[1]) ? spin.balls[1] : spin.balls[0], m);
+    HoldAbout(n_W,
+              is_bare(spin.balls[0]) || !is_bare(spin.balls[1]) ? spin.balls[0] : spin.balls[1], m);
     names.push_back(spin.name);
   }
   return {
