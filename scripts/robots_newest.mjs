@@ -283,7 +283,9 @@ function compileFile({mj}, file, change) {
   const below = /meshdir\s*=\s*["']([^"']*)/.exec(text)?.[1] ?? /assetdir\s*=\s*["']([^"']*)/.exec(text)?.[1] ?? '';
   for (const [, name] of text.matchAll(/<mesh[^>]*\sfile\s*=\s*["']([^"']*\.stl)["']/gi)) {
     const place = path.join(below, name);
-    if (!fs.existsSync(path.join(folder, place))) vfs.addBuffer(place, tetrahedron());
+    const whole = path.join(folder, place);
+    if (!fs.existsSync(whole)) vfs.addBuffer(place, tetrahedron());
+    else if (place.startsWith('..')) vfs.addBuffer(place, fs.readFileSync(whole));
   }
   for (const name of fs.readdirSync(folder, {recursive: true})) {
     const whole = path.join(folder, name);
