@@ -504,12 +504,9 @@ std::string CodeCheck::Slip(CodeReference* reference) const {
           if (!close(has, factor.by * series(force, false, k))) continue;
           explained = true;
           if (!slips.empty()) slips += "; ";
-          slips += fmt::format("the {} of {} is that of {}", force ? "force" : "position", name(i),
-                               name(k));
-          if (k == i)
-            slips = slips.substr(0, slips.rfind(" is that of")) + " " + factor.says;
-          else if (factor.by != 1.0)
-            slips += fmt::format(" and {}", factor.says);
+          slips += fmt::format("the {} of {}", force ? "force" : "position", name(i));
+          if (k != i) slips += " is that of " + name(k);
+          if (factor.by != 1.0) slips += (k == i ? " " : " and ") + std::string(factor.says);
           break;
         }
       }

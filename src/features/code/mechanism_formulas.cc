@@ -920,8 +920,7 @@ class FormulaMaker {
   }
 
   // Force −F along a coordinate, as RequiredWrenches() counts: what is needed beyond it.
-  void Take(Expr value, Expr force, std::vector<Expr>* along) {
-    const Expr rate = Rate(value);
+  void Take(Expr rate, Expr force, std::vector<Expr>* along) {
     for (size_t k = 0; k < along->size(); ++k) {
       const Expr factor = Coefficients({rate}, k)[0];
       if (!made_->graph.IsZero(factor)) (*along)[k] -= factor * force;
@@ -944,15 +943,30 @@ class FormulaMaker {
           element.joint >= 0
               ? Coordinate{Coordinate::Kind::kJoint, element.joint, element.coordinate}
               : Coordinate{Coordinate::Kind::kDrive, element.drive, 0};
-      const Expr q = FormulaOf(at).value, v = Rate(q), dv = Rate(v);
+      Expr q, v;
+      if (ActsOnBall(m_, element)) {  // no position; rates about the child's axes
+        const int k = rate_[static_cast<size_t>(element.joint)].empty()
+                          ? kNotDirect
+                          : rate_[static_cast<size_t>(element.joint)]
+                                 [static_cast<size_t>(element.coordinate)];
+        if (k < 0) {
+          Unsupported(Described(m_, element) + " acts on a ball that closes a loop");
+          continue;
+        }
+        v = made_->u[static_cast<size_t>(k)];
+      } else {
+        q = FormulaOf(at).value;
+        v = Rate(q);
+      }
+      const Expr dv = Rate(v);
       if (const auto* damping = std::get_if<DampingLaw>(&element.law)) {
-        Take(q, -(Expr(damping->damping) * v), along);
+        Take(v, -(Expr(damping->damping) * v), along);
       } else if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
         Expr sum(0.0);
         const Expr x = q - Expr(spring->free);
         for (size_t i = spring->polynomial.size(); i-- > 0;)
           sum = (sum + spring->polynomial[i]) * x;
-        Take(q, -(Expr(spring->preload) + sum), along);
+        Take(v, -(Expr(spring->preload) + sum), along);
       } else if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
         Expr force = -(Expr(rotor->reflected()) * dv);
         if (rotor->carrier && rotor->carrier->body > 0) {
@@ -962,7 +976,7 @@ class FormulaMaker {
           force -= h * axis.dot(alpha[b]);
           (*moment)[b] += (axis * (h * dv) + Cross(omega_[b], axis) * (h * v)).eval();
         }
-        Take(q, force, along);
+        Take(v, force, along);
       } else if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
         if (friction->per_load() > 0.0)
           Unsupported(Described(m_, element) + " grows with its load");
@@ -973,7 +987,7 @@ class FormulaMaker {
           const Expr slowness = v / Expr(friction->stribeck_rate);
           size += Expr(friction->breakaway - friction->coulomb) * exp(-(slowness * slowness));
         }
-        Take(q, -(direction * size), along);
+        Take(v, -(direction * size), along);
       }
     }
     for (const SpringDamper& spring : m_.springs) {
@@ -982,7 +996,7 @@ class FormulaMaker {
       to.translation() = spring.p_to;
       const PoseE X = Between(spring.body_from, from, spring.body_to, to);
       const Expr length = sqrt(X.p.dot(X.p));
-      Take(length,
+      Take(Rate(length),
            -(Expr(spring.stiffness) * (length - Expr(spring.free_length_m)) +
              Expr(spring.damping) * Rate(length)),
            along);
