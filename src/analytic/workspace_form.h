@@ -9,6 +9,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -45,6 +46,10 @@ struct WorkspaceMeasure {
   std::string name;  ///< "volume by voxels"
   double value = kNan, error = kNan;
   std::string unit;
+  /// The set that it measures, for other ways to it: output coordinates "x" … that are free, and
+  /// values of others; poses beyond singularities of type 2 count. Empty: no set of poses.
+  std::vector<std::string> over = {};
+  std::vector<std::pair<std::string, double>> at = {};
 };
 
 struct WorkspaceForm {

@@ -454,7 +454,8 @@ WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRe
   outcome.agree = report.contradictions.empty();
   outcome.text = report.text;
   for (const VolumeEstimate& v : report.volumes) {
-    outcome.measures.push_back({"volume by " + std::string(v.way), v.value, v.error, "m3"});
+    outcome.measures.push_back(
+        {"volume by " + std::string(v.way), v.value, v.error, "m3", {"x", "y", "z"}});
   }
   outcome.measures.push_back({"area", report.exact.area, report.area_error, "m2"});
   for (const int k : {0, 1, 2}) {

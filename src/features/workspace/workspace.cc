@@ -13,28 +13,6 @@
 namespace mbv {
 namespace {
 
-// The mechanism at home inside a translucent mesh, seen from two sides.
-RunSummary DrawInside(const Mechanism& mechanism, const TriangleMesh& mesh,
-                      const std::string& title, WorkspaceOutcome* outcome) {
-  PictureFrame frame = HomeFrame(mechanism);
-  frame.caption.title = title;
-  Overlay overlay;
-  overlay.meshes.push_back({mesh.vertices, mesh.triangles, "#2f7ed880"});
-  for (const auto& [name, azimuth, elevation] : {std::tuple{"workspace_front.png", 25.0, 15.0},
-                                                 std::tuple{"workspace_below.png", 140.0, -20.0}}) {
-    PictureOptions options;
-    options.camera.azimuth_deg = azimuth;
-    options.camera.elevation_deg = elevation;
-    const RunSummary summary = RenderPictures(
-        mechanism, {frame}, overlay, options, [&, file = name](int, Picture picture) {
-          outcome->files.emplace_back(file, EncodePng(picture));
-          return true;
-        });
-    if (!summary.ok()) return summary;
-  }
-  return RunSummary::Done();
-}
-
 // The workspace has no other witness: outside what the equations cover it is an error.
 void RefuseUncovered(const Mechanism& mechanism, Diagnostics* diagnostics) {
   const ClosedFormRow* row = FindClosedForm(mechanism.name);
@@ -61,6 +39,31 @@ std::string ContentOf(const WorkspaceFile& file) {
 }
 
 }  // namespace
+
+RunSummary DrawInside(const Mechanism& mechanism,
+                      const std::vector<std::pair<TriangleMesh, std::string>>& surfaces,
+                      const std::string& title, const std::string& name,
+                      std::vector<std::pair<std::string, std::string>>* files) {
+  PictureFrame frame = HomeFrame(mechanism);
+  frame.caption.title = title;
+  Overlay overlay;
+  for (const auto& [mesh, color] : surfaces) {
+    overlay.meshes.push_back({mesh.vertices, mesh.triangles, color + "80"});
+  }
+  for (const auto& [side, azimuth, elevation] :
+       {std::tuple{"front", 25.0, 15.0}, std::tuple{"below", 140.0, -20.0}}) {
+    PictureOptions options;
+    options.camera.azimuth_deg = azimuth;
+    options.camera.elevation_deg = elevation;
+    const RunSummary summary =
+        RenderPictures(mechanism, {frame}, overlay, options, [&, at = side](int, Picture picture) {
+          files->emplace_back(fmt::format("{}_{}.png", name, at), EncodePng(picture));
+          return true;
+        });
+    if (!summary.ok()) return summary;
+  }
+  return RunSummary::Done();
+}
 
 std::vector<std::string> WorkspaceMechanisms() {
   std::vector<std::string> names;
@@ -102,7 +105,8 @@ WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures, int
     }
   }
   if (!pictures || !form.summary.ok() || form.mesh.triangles.empty()) return outcome;
-  const RunSummary drawn = DrawInside(mechanism, form.mesh, form.mesh_caption, &outcome);
+  const RunSummary drawn = DrawInside(mechanism, {{form.mesh, "#2f7ed8"}}, form.mesh_caption,
+                                      "workspace", &outcome.files);
   if (!drawn.ok()) outcome.summary = drawn;
   return outcome;
 }

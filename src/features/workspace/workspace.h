@@ -1,4 +1,5 @@
 // Workspaces of the mechanisms whose closed forms compute one: text, data files and pictures.
+// Those of any model: reachable_set.h.
 #pragma once
 
 #include <string>
@@ -23,6 +24,12 @@ struct WorkspaceOutcome {
   std::vector<std::pair<std::string, LinePlot>> plots;     ///< of those that draw lines
   std::vector<std::pair<std::string, MapPlot>> maps;       ///< of those that colour cells
 };
+
+/// The mechanism at home inside coloured surfaces (given in world axes), from two sides.
+[[nodiscard]] RunSummary DrawInside(
+    const Mechanism& mechanism, const std::vector<std::pair<TriangleMesh, std::string>>& surfaces,
+    const std::string& title, const std::string& name,
+    std::vector<std::pair<std::string, std::string>>* files);
 
 /// Mechanism names that ComputeWorkspace() supports.
 [[nodiscard]] std::vector<std::string> WorkspaceMechanisms();

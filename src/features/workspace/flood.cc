@@ -1,0 +1,698 @@
+#include "features/workspace/flood.h"
+
+#include <fmt/format.h>
+#include <Eigen/LU>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <set>
+#include <thread>
+#include <unordered_map>
+
+#include "base/worker_pool.h"
+
+namespace mbv {
+namespace {
+
+using Lattice = std::array<int, 3>;
+
+constexpr double kSame = 1e-6;          // two poses of a corner [rad, characteristic lengths]
+constexpr double kCutShare = 1e-4;      // of an edge, to which a cut is found
+constexpr int kMostCuts = 30;
+constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
+constexpr double kMostCorners = 4e6;
+constexpr std::array<int, 4> kUsualResolution = {0, 400, 240, 64};
+
+struct LatticeHash {
+  size_t operator()(const Lattice& k) const {
+    size_t h = 0;
+    for (const int i : k) h = h * 1000003u + static_cast<size_t>(static_cast<std::uint32_t>(i));
+    return h;
+  }
+};
+
+struct Corner {
+  bool inside = false, closes = false;
+  int bound = -1;
+  SpacePose pose;  // where it closes
+};
+
+// Calls work(i, its own space) for all i.
+void OnThreads(size_t count, int threads, const PoseSpace& space, std::atomic<long>* closings,
+               const std::function<void(size_t, PoseSpace&)>& work) {
+  std::atomic<size_t> next = 0;
+  const auto run = [&] {
+    PoseSpace own = space;
+    const long before = own.closings();
+    for (size_t i = next++; i < count; i = next++) work(i, own);
+    *closings += own.closings() - before;
+  };
+  std::vector<std::thread> others;
+  for (int t = 1; t < threads && static_cast<size_t>(t) < count; ++t) others.emplace_back(run);
+  run();
+  for (std::thread& other : others) other.join();
+}
+
+// One tetrahedron, triangle or segment: corners with their values' signs and cuts.
+struct Simplex {
+  std::array<Lattice, 4> corner{};
+};
+
+class Flooder {
+ public:
+  Flooder(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
+          const std::function<void(double)>& progress)
+      : space_(space), home_(home), settings_(settings), progress_(progress), k_(space.over()) {}
+
+  FloodedSet Flood() {
+    if (!ChooseStep()) return std::move(set_);
+    FloodCoarse();
+    if (!set_.summary.ok()) return std::move(set_);
+    for (int level = 0; level <= settings_.halvings; ++level) {
+      if (level > 0) Refine(level);
+      if (level >= settings_.halvings - 2) {
+        CutEdges(level);
+        set_.levels.push_back(Measure(level, level == settings_.halvings));
+      }
+    }
+    const auto count = set_.levels.size();
+    set_.measure = set_.levels.back();
+    // Of second order, but for corners: where several bounds cut a cell, half of it is open.
+    set_.error = std::abs(set_.levels[count - 1] - set_.levels[count - 2]) + 0.5 * CornerCells();
+    set_.corners = static_cast<long>(corners_.size());
+    for (const auto& [key, corner] : corners_) set_.inside += corner.inside;
+    set_.closings = closings_;
+    KeepLattice();
+    return std::move(set_);
+  }
+
+ private:
+  [[nodiscard]] int SpacingAt(int level) const { return 1 << (settings_.halvings - level); }
+  [[nodiscard]] VecX At(const Lattice& key) const {
+    VecX x = home_.pose.at.head(k_);
+    for (int c = 0; c < k_; ++c) x[c] += set_.step.at(static_cast<size_t>(c)) * key.at(static_cast<size_t>(c));
+    return x;
+  }
+  [[nodiscard]] Vec3 PointOf(const VecX& x) const {
+    Vec3 p = Vec3::Zero();
+    p.head(k_) = x;
+    return p;
+  }
+
+  // By how far the set reaches along the coordinates from home; the flood may go farther.
+  bool ChooseStep() {
+    const auto start = std::chrono::steady_clock::now();
+    const int resolution = settings_.resolution > 0
+                               ? settings_.resolution
+                               : kUsualResolution.at(static_cast<size_t>(k_));
+    double cells = 1.0;
+    long poses = 0;
+    for (int c = 0; c < k_; ++c) {
+      double reach = 0.0;
+      for (const double sign : {-1.0, 1.0}) {
+        PlacedPose at = home_;
+        const double step = 0.02 * space_.UnitOf(c);
+        int count = 0;
+        for (; count < 10000; ++count, ++poses) {
+          VecX target = at.pose.at;
+          target[c] += sign * step;
+          PlacedPose next;
+          if (!space_.Close(at, target, &next) || next.pose.margin.minCoeff() < 0.0) break;
+          at = std::move(next);
+        }
+        if (count == 10000) {
+          set_.summary.stop = Stop::kUnreachable;
+          set_.summary.message = "the set has no end: no range, box or singularity bounds " +
+                                 space_.settings().coordinates[static_cast<size_t>(c)].name;
+          return false;
+        }
+        reach += step * (count + 0.5);
+      }
+      set_.step.at(static_cast<size_t>(c)) = 1.15 * reach / resolution;
+      cells *= 1.15 * resolution;
+    }
+    const double each =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() /
+        static_cast<double>(std::max(poses, 1L));
+    // Coarse cells everywhere, fine ones and their cuts on the boundary.
+    const double boundary = k_ * 2.0 * std::pow(static_cast<double>(resolution), k_ - 1) * 6.0;
+    const double corners = cells / std::pow(SpacingAt(0), k_) + boundary;
+    set_.estimate_s = each * (corners + 3.0 * boundary) / settings_.threads;
+    if (set_.estimate_s > settings_.most_s || corners > kMostCorners) {
+      set_.summary.stop = Stop::kUnsupported;
+      set_.summary.message =
+          fmt::format("--resolution {} takes about {} ({:.2g} poses)", resolution,
+                      TimeText(set_.estimate_s), corners + 3.0 * boundary);
+      return false;
+    }
+    return true;
+  }
+
+  void Take(const Lattice& key, Corner corner) {
+    Corner& known = corners_[key];
+    if (!known.closes || !corner.closes) {
+      if (!known.closes) known = std::move(corner);
+      return;
+    }
+    if (known.inside && corner.inside && Differ(known.pose, corner.pose)) ++set_.conflicts;
+    if (!known.inside && corner.inside) known = std::move(corner);
+  }
+  [[nodiscard]] bool Differ(const SpacePose& a, const SpacePose& b) const {
+    for (size_t j = 0; j < a.X_FM.size(); ++j) {
+      const double turn = (a.X_FM[j].linear() - b.X_FM[j].linear()).cwiseAbs().maxCoeff();
+      const double slide =
+          (a.X_FM[j].translation() - b.X_FM[j].translation()).norm() / space_.length();
+      if (turn > kSame || slide > kSame) return true;
+    }
+    return false;
+  }
+
+  [[nodiscard]] Corner Visit(const PoseSpace& space, const PlacedPose& from,
+                             const Lattice& key) const {
+    Corner corner;
+    PlacedPose at;
+    if (!space.Close(from, space.Target(At(key)), &at)) return corner;
+    corner.closes = true;
+    Eigen::Index worst = 0;
+    corner.inside = at.pose.margin.minCoeff(&worst) >= 0.0;
+    if (!corner.inside) corner.bound = static_cast<int>(worst);
+    corner.pose = std::move(at.pose);
+    return corner;
+  }
+
+  void FloodCoarse() {
+    const int spacing = SpacingAt(0);
+    Corner first;
+    first.inside = first.closes = true;
+    first.pose = home_.pose;
+    corners_[{0, 0, 0}] = std::move(first);
+    std::vector<Lattice> front = {{0, 0, 0}};
+    while (!front.empty()) {
+      // Each front at once; what it finds is taken in its order.
+      std::vector<std::vector<std::pair<Lattice, Corner>>> found(front.size());
+      OnThreads(front.size(), settings_.threads, space_, &closings_, [&](size_t i, PoseSpace& own) {
+        PlacedPose from;
+        const auto at = corners_.find(front[i]);
+        if (!own.Place(at->second.pose, &from)) return;
+        for (int c = 0; c < k_; ++c) {
+          for (const int sign : {-1, 1}) {
+            Lattice key = front[i];
+            key.at(static_cast<size_t>(c)) += sign * spacing;
+            found[i].emplace_back(key, Visit(own, from, key));
+          }
+        }
+      });
+      std::set<Lattice> next;
+      for (auto& list : found) {
+        for (auto& [key, corner] : list) {
+          const auto known = corners_.find(key);
+          const bool was_inside = known != corners_.end() && known->second.inside;
+          Take(key, std::move(corner));
+          if (!was_inside && corners_[key].inside) next.insert(key);
+        }
+      }
+      front.assign(next.begin(), next.end());
+      if (static_cast<double>(corners_.size()) > kMostCorners) {
+        set_.summary.stop = Stop::kUnsupported;
+        set_.summary.message = "the set is larger than this resolution can fill";
+        return;
+      }
+      Report(0.3 * (1.0 - 1.0 / (1.0 + 0.1 * static_cast<double>(++waves_))));
+    }
+    for (const auto& [key, corner] : corners_) {
+      if (!corner.inside) continue;
+      ForEachCorner([&](const Lattice& offset) {
+        Lattice cell = key;
+        for (size_t c = 0; c < 3; ++c) cell.at(c) -= spacing * offset.at(c);
+        cells_[0].insert(cell);
+      });
+    }
+    Complete(0, {cells_[0].begin(), cells_[0].end()});
+    set_.summary = RunSummary::Done();
+  }
+
+  void Report(double fraction) const {
+    if (progress_) progress_(fraction);
+  }
+
+  template <typename F>
+  void ForEachCorner(const F& f, int most = 1) const {
+    Lattice offset{};
+    const auto all = [&](auto&& self, int c) -> void {
+      if (c == k_) {
+        f(offset);
+        return;
+      }
+      for (int i = 0; i <= most; ++i) {
+        offset.at(static_cast<size_t>(c)) = i;
+        self(self, c + 1);
+      }
+      offset.at(static_cast<size_t>(c)) = 0;
+    };
+    all(all, 0);
+  }
+  [[nodiscard]] static Lattice Sum(Lattice a, const Lattice& b, int factor) {
+    for (size_t c = 0; c < 3; ++c) a.at(c) += factor * b.at(c);
+    return a;
+  }
+
+  // Corners of cells that were not visited, from the nearest one inside of the same cell's parent.
+  void Complete(int level, const std::vector<Lattice>& cells) {
+    const int spacing = SpacingAt(level);
+    std::map<Lattice, Lattice> wanted;  // and from where
+    for (const Lattice& cell : cells) {
+      ForEachCorner([&](const Lattice& offset) {
+        const Lattice key = Sum(cell, offset, spacing);
+        if (corners_.contains(key) || wanted.contains(key)) return;
+        const Lattice* best = nullptr;
+        long least = 0;
+        Lattice candidate{};
+        // Corners of this cell, and of the one that it is a part of.
+        for (int wider = 1; wider <= 2 && best == nullptr; ++wider) {
+          const int s = spacing * wider;
+          Lattice base = cell;
+          if (wider == 2) {
+            for (int& i : base) i = (i >= 0 ? i / s : -((-i + s - 1) / s)) * s;
+          }
+          ForEachCorner([&](const Lattice& o) {
+            const Lattice other = Sum(base, o, s);
+            const auto at = corners_.find(other);
+            if (at == corners_.end() || !at->second.inside) return;
+            long distance = 0;
+            for (size_t c = 0; c < 3; ++c) {
+              const long d = other.at(c) - key.at(c);
+              distance += d * d;
+            }
+            if (best != nullptr && distance >= least) return;
+            candidate = other;
+            best = &candidate;
+            least = distance;
+          });
+        }
+        if (best != nullptr) wanted.emplace(key, candidate);
+      });
+    }
+    const std::vector<std::pair<Lattice, Lattice>> list(wanted.begin(), wanted.end());
+    std::vector<Corner> found(list.size());
+    OnThreads(list.size(), settings_.threads, space_, &closings_, [&](size_t i, PoseSpace& own) {
+      PlacedPose from;
+      if (own.Place(corners_.find(list[i].second)->second.pose, &from)) {
+        found[i] = Visit(own, from, list[i].first);
+      }
+    });
+    for (size_t i = 0; i < list.size(); ++i) Take(list[i].first, std::move(found[i]));
+  }
+
+  [[nodiscard]] bool IsIn(const Lattice& key) const {
+    const auto at = corners_.find(key);
+    return at != corners_.end() && at->second.inside;
+  }
+  // 0: outside, 1: cut, 2: inside, by the corners of spacing `step` in a cell.
+  [[nodiscard]] int StateOf(const Lattice& cell, int spacing, int step) const {
+    bool in = false, out = false;
+    ForEachCorner(
+        [&](const Lattice& offset) {
+          const Lattice key = Sum(cell, offset, step);
+          const auto at = corners_.find(key);
+          if (at == corners_.end()) {
+            out = out || step == spacing;
+            return;
+          }
+          (at->second.inside ? in : out) = true;
+        },
+        spacing / step);
+    return in && out ? 1 : in ? 2 : 0;
+  }
+
+  void Refine(int level) {
+    const int wide = SpacingAt(level - 1), spacing = SpacingAt(level);
+    std::set<Lattice> refined;
+    std::vector<Lattice> todo;
+    for (const Lattice& cell : cells_[static_cast<size_t>(level - 1)]) {
+      if (StateOf(cell, wide, wide) == 1) todo.push_back(cell);
+    }
+    while (!todo.empty()) {
+      std::vector<Lattice> children;
+      for (const Lattice& cell : todo) {
+        refined.insert(cell);
+        ForEachCorner([&](const Lattice& offset) { children.push_back(Sum(cell, offset, spacing)); });
+      }
+      Complete(level, children);
+      // Neighbours that a finer corner shows to be cut.
+      std::set<Lattice> more;
+      for (const Lattice& cell : todo) {
+        ForEachCorner(
+            [&](const Lattice& offset) {
+              Lattice other = cell;
+              for (size_t c = 0; c < static_cast<size_t>(k_); ++c) {
+                other.at(c) += wide * (offset.at(c) - 1);
+              }
+              if (refined.contains(other) || more.contains(other)) return;
+              if (StateOf(other, wide, spacing) != 1) return;
+              cells_[static_cast<size_t>(level - 1)].insert(other);
+              more.insert(other);
+            },
+            2);
+      }
+      Complete(level - 1, {more.begin(), more.end()});
+      todo.assign(more.begin(), more.end());
+    }
+    auto& finer = cells_[static_cast<size_t>(level)];
+    for (const Lattice& cell : refined) {
+      cells_[static_cast<size_t>(level - 1)].erase(cell);
+      refined_[static_cast<size_t>(level - 1)].insert(cell);
+      ForEachCorner([&](const Lattice& offset) { finer.insert(Sum(cell, offset, spacing)); });
+    }
+    Report(0.3 + 0.3 * level / settings_.halvings);
+  }
+
+  // Kuhn's simplices of a cell: one per order of the coordinates.
+  template <typename F>
+  void ForEachSimplex(const Lattice& cell, int spacing, const F& f) const {
+    std::array<int, 3> order = {0, 1, 2};
+    do {
+      Simplex simplex;
+      simplex.corner[0] = cell;
+      for (int i = 0; i < k_; ++i) {
+        const auto at = static_cast<size_t>(i);
+        simplex.corner.at(at + 1) = simplex.corner.at(at);
+        simplex.corner.at(at + 1).at(static_cast<size_t>(order.at(at))) += spacing;
+      }
+      f(simplex);
+    } while (std::next_permutation(order.begin(), order.begin() + k_));
+  }
+
+  using Edge = std::pair<Lattice, Lattice>;  // from inside to outside
+  struct Cut {
+    double share = 0.5;
+    int bound = -1, vertex = -1;
+  };
+  struct EdgeHash {
+    size_t operator()(const Edge& e) const {
+      return LatticeHash()(e.first) * 31u + LatticeHash()(e.second);
+    }
+  };
+
+  // Cells that count at a level: those of this size, and larger ones.
+  [[nodiscard]] std::vector<Lattice> CutCells(int level) const {
+    std::vector<Lattice> cells;
+    for (const Lattice& cell : cells_[static_cast<size_t>(level)]) {
+      if (StateOf(cell, SpacingAt(level), SpacingAt(level)) == 1) cells.push_back(cell);
+    }
+    std::ranges::sort(cells);
+    return cells;
+  }
+
+  void CutEdges(int level) {
+    const int spacing = SpacingAt(level);
+    std::set<Edge> wanted;
+    for (const Lattice& cell : CutCells(level)) {
+      ForEachSimplex(cell, spacing, [&](const Simplex& simplex) {
+        for (int i = 0; i <= k_; ++i) {
+          for (int j = 0; j <= k_; ++j) {
+            const Lattice &a = simplex.corner.at(static_cast<size_t>(i)),
+                          &b = simplex.corner.at(static_cast<size_t>(j));
+            if (IsIn(a) && !IsIn(b) && !cuts_.contains({a, b})) wanted.insert({a, b});
+          }
+        }
+      });
+    }
+    const std::vector<Edge> edges(wanted.begin(), wanted.end());
+    std::vector<Cut> cuts(edges.size());
+    std::atomic<size_t> done = 0;
+    OnThreads(edges.size(), settings_.threads, space_, &closings_, [&](size_t i, PoseSpace& own) {
+      cuts[i] = CutOf(own, edges[i]);
+      if (++done % 4096 == 0 && level == settings_.halvings) {
+        Report(0.6 + 0.4 * static_cast<double>(done) / static_cast<double>(edges.size()));
+      }
+    });
+    for (size_t i = 0; i < edges.size(); ++i) {
+      cuts_.emplace(edges[i], cuts[i]);
+    }
+  }
+
+  [[nodiscard]] Cut CutOf(const PoseSpace& space, const Edge& edge) const {
+    const VecX a = At(edge.first), b = At(edge.second);
+    PlacedPose from, at;
+    Cut cut;
+    if (!space.Place(corners_.find(edge.first)->second.pose, &from)) return cut;
+    double low = 0.0, high = 1.0;
+    VecX margin_low = from.pose.margin, margin_high;
+    const auto close = [&](double s) {
+      return space.CloseNear(from, space.Target(a + s * (b - a)), &at);
+    };
+    if (space.Close(from, space.Target(b), &at)) {
+      if (at.pose.margin.minCoeff() >= 0.0) {  // outside by another sheet
+        cut.share = 1.0;
+        return cut;
+      }
+      margin_high = at.pose.margin;
+    }
+    // A fold is approached in steps that close, towards where the square of its margin would
+    // vanish, which is linear there.
+    double fold = kNan, step = 0.5;
+    for (int i = 0; i < kMostCuts && margin_high.size() == 0 && step > 0.1 * kCutShare; ++i) {
+      if (!close(low + step)) {
+        step *= 0.5;
+        continue;
+      }
+      if (at.pose.margin.minCoeff() < 0.0) {
+        high = low + step;
+        margin_high = at.pose.margin;
+        break;
+      }
+      cut.bound = FoldBound(at.pose.margin);
+      const double known = fold;
+      if (cut.bound >= 0) {
+        const double m0 = std::pow(margin_low[cut.bound], 2),
+                     m1 = std::pow(at.pose.margin[cut.bound], 2);
+        fold = low + step + m1 * step / (m0 - m1);
+      }
+      low += step;
+      margin_low = at.pose.margin;
+      from = at;
+      if (std::abs(fold - known) < 0.1 * kCutShare) break;
+      step = std::min(std::isfinite(fold) ? 0.7 * (fold - low) : step, 0.9 * (1.0 - low));
+    }
+    for (int i = 0; i < 3 && margin_high.size() > 0 && high - low > kCutShare; ++i) {
+      // The first root of the margins' chords; a little to its sides, so that both ends close in.
+      const double root = RootOf(margin_low, margin_high, &cut.bound);
+      const double s =
+          low + std::clamp(root + (i % 2 == 1 ? 0.02 : -0.02), 0.001, 0.999) * (high - low);
+      if (!close(s)) break;
+      const bool in = at.pose.margin.minCoeff() >= 0.0;
+      (in ? low : high) = s;
+      (in ? margin_low : margin_high) = at.pose.margin;
+      if (in) from = at;
+    }
+    cut.share = margin_high.size() > 0
+                    ? low + RootOf(margin_low, margin_high, &cut.bound) * (high - low)
+                : std::isfinite(fold) ? std::clamp(fold, low, 1.0)
+                                      : low;
+    return cut;
+  }
+  [[nodiscard]] static double RootOf(const VecX& low, const VecX& high, int* bound) {
+    double root = 1.0;
+    for (Eigen::Index j = 0; j < high.size(); ++j) {
+      if (high[j] >= 0.0) continue;
+      const double share = low[j] / (low[j] - high[j]);
+      if (share >= root) continue;
+      root = share;
+      *bound = static_cast<int>(j);
+    }
+    return root;
+  }
+  // Where poses stop to close: a fold, unless a constraint is about to be lost.
+  [[nodiscard]] int FoldBound(const VecX& margin) const {
+    int bound = -1;
+    for (size_t j = 0; j < space_.bounds().size(); ++j) {
+      const SetBound::Kind kind = space_.bounds()[j].kind;
+      const double m = margin[static_cast<Eigen::Index>(j)];
+      if (kind == SetBound::Kind::kConstraint && m < kNearlyLost) return static_cast<int>(j);
+      if (kind == SetBound::Kind::kType1 && m < kNearlyFold) bound = static_cast<int>(j);
+    }
+    return bound;
+  }
+
+  [[nodiscard]] Vec3 CutPoint(const Lattice& in, const Lattice& out, Cut** cut) {
+    const auto at = cuts_.find({in, out});
+    *cut = &at->second;
+    const VecX a = At(in), b = At(out);
+    return PointOf(a + at->second.share * (b - a));
+  }
+
+  [[nodiscard]] double Size(const std::array<Vec3, 4>& p) const {
+    if (k_ == 1) return std::abs(p[1][0] - p[0][0]);
+    if (k_ == 2) {
+      const Vec3 u = p[1] - p[0], v = p[2] - p[0];
+      return 0.5 * std::abs(u[0] * v[1] - u[1] * v[0]);
+    }
+    return std::abs((p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0])) / 6.0;
+  }
+
+  // Inside part of a simplex; with facets of the boundary if wanted.
+  double InsideOf(const Simplex& simplex, bool facets) {
+    std::vector<Lattice> in, out;
+    for (int i = 0; i <= k_; ++i) {
+      const Lattice& key = simplex.corner.at(static_cast<size_t>(i));
+      (IsIn(key) ? in : out).push_back(key);
+    }
+    const auto point = [&](const Lattice& key) { return PointOf(At(key)); };
+    std::array<Vec3, 4> p;
+    if (out.empty() || in.empty()) {
+      if (in.empty()) return 0.0;
+      for (size_t i = 0; i < in.size(); ++i) p.at(i) = point(in[i]);
+      return Size(p);
+    }
+    // Cuts by inside and outside corner.
+    std::vector<std::vector<Vec3>> cut(in.size());
+    std::vector<std::vector<Cut*>> of(in.size());
+    for (size_t i = 0; i < in.size(); ++i) {
+      for (const Lattice& o : out) {
+        Cut* at = nullptr;
+        cut[i].push_back(CutPoint(in[i], o, &at));
+        of[i].push_back(at);
+      }
+    }
+    const auto facet = [&](std::initializer_list<std::pair<size_t, size_t>> corners) {
+      if (!facets) return;
+      FloodFacet made;
+      size_t v = 0;
+      for (const auto& [i, o] : corners) {
+        Cut* at = of[i][o];
+        if (at->vertex < 0) {
+          at->vertex = static_cast<int>(set_.vertices.size());
+          set_.vertices.push_back({cut[i][o], at->bound});
+        }
+        made.vertices.at(v++) = at->vertex;
+      }
+      if (k_ == 3) {
+        const Vec3 &a = set_.vertices[static_cast<size_t>(made.vertices[0])].at,
+                   &b = set_.vertices[static_cast<size_t>(made.vertices[1])].at,
+                   &c = set_.vertices[static_cast<size_t>(made.vertices[2])].at;
+        if ((b - a).cross(c - a).dot(point(out[0]) - a) < 0.0) {
+          std::swap(made.vertices[1], made.vertices[2]);
+        }
+      }
+      set_.facets.push_back(made);
+    };
+    if (k_ == 1) {
+      facet({{0, 0}});
+      return Size({point(in[0]), cut[0][0], {}, {}});
+    }
+    if (k_ == 2 && in.size() == 1) {
+      facet({{0, 0}, {0, 1}});
+      return Size({point(in[0]), cut[0][0], cut[0][1], {}});
+    }
+    if (k_ == 2) {
+      facet({{0, 0}, {1, 0}});
+      return Size({point(in[0]), point(in[1]), cut[1][0], {}}) +
+             Size({point(in[0]), cut[1][0], cut[0][0], {}});
+    }
+    if (in.size() == 1) {
+      facet({{0, 0}, {0, 1}, {0, 2}});
+      return Size({point(in[0]), cut[0][0], cut[0][1], cut[0][2]});
+    }
+    if (in.size() == 3) {
+      facet({{0, 0}, {1, 0}, {2, 0}});
+      return Size({point(in[0]), point(in[1]), point(in[2]), cut[0][0]}) +
+             Size({point(in[1]), point(in[2]), cut[0][0], cut[1][0]}) +
+             Size({point(in[2]), cut[0][0], cut[1][0], cut[2][0]});
+    }
+    facet({{0, 0}, {0, 1}, {1, 1}});
+    facet({{0, 0}, {1, 1}, {1, 0}});
+    return Size({point(in[0]), point(in[1]), cut[0][0], cut[0][1]}) +
+           Size({point(in[1]), cut[0][0], cut[0][1], cut[1][1]}) +
+           Size({point(in[1]), cut[0][0], cut[1][1], cut[1][0]});
+  }
+
+  double Measure(int level, bool facets) {
+    double cell_size = 1.0;
+    for (int c = 0; c < k_; ++c) cell_size *= set_.step.at(static_cast<size_t>(c));
+    double sum = 0.0;
+    long full = 0;
+    for (int l = 0; l <= level; ++l) {
+      const int spacing = SpacingAt(l);
+      for (const Lattice& cell : cells_[static_cast<size_t>(l)]) {
+        if (StateOf(cell, spacing, spacing) == 2) {
+          full += static_cast<long>(std::pow(spacing, k_));
+        }
+      }
+    }
+    sum = static_cast<double>(full) * cell_size;
+    for (const Lattice& cell : CutCells(level)) {
+      ForEachSimplex(cell, SpacingAt(level),
+                     [&](const Simplex& simplex) { sum += InsideOf(simplex, facets); });
+    }
+    return sum;
+  }
+
+  // Size of the finest cells that several bounds cut.
+  [[nodiscard]] double CornerCells() const {
+    if (k_ == 1) return 0.0;
+    double size = 0.0;
+    for (const Lattice& cell : CutCells(settings_.halvings)) {
+      int bound = -2;
+      bool several = false;
+      ForEachSimplex(cell, 1, [&](const Simplex& simplex) {
+        for (int i = 0; i <= k_; ++i) {
+          for (int j = 0; j <= k_; ++j) {
+            const auto cut = cuts_.find({simplex.corner.at(static_cast<size_t>(i)),
+                                         simplex.corner.at(static_cast<size_t>(j))});
+            if (cut == cuts_.end()) continue;
+            several = several || (bound != -2 && bound != cut->second.bound);
+            bound = cut->second.bound;
+          }
+        }
+      });
+      if (several) size += 1.0;
+    }
+    for (int c = 0; c < k_; ++c) size *= set_.step.at(static_cast<size_t>(c));
+    return size;
+  }
+
+  void KeepLattice() {
+    const int spacing = SpacingAt(0);
+    for (size_t c = 0; c < 3; ++c) set_.lattice_step.at(c) = spacing * set_.step.at(c);
+    std::vector<Lattice> keys;
+    for (const auto& [key, corner] : corners_) {
+      bool coarse = true;
+      for (const int i : key) coarse = coarse && i % spacing == 0;
+      if (coarse) keys.push_back(key);
+    }
+    std::ranges::sort(keys, {}, [](const Lattice& k) { return Lattice{k[2], k[1], k[0]}; });
+    for (const Lattice& key : keys) {
+      const Corner& corner = corners_[key];
+      set_.lattice.push_back({PointOf(At(key)), corner.inside, corner.bound,
+                              corner.inside ? corner.pose : SpacePose{}});
+    }
+  }
+
+  const PoseSpace& space_;
+  const PlacedPose& home_;
+  const FloodSettings settings_;
+  const std::function<void(double)>& progress_;
+  const int k_;
+  FloodedSet set_;
+  std::unordered_map<Lattice, Corner, LatticeHash> corners_;
+  std::array<std::set<Lattice>, 6> cells_, refined_;  // by level: not refined; refined
+  std::unordered_map<Edge, Cut, EdgeHash> cuts_;
+  std::atomic<long> closings_ = 0;
+  int waves_ = 0;
+};
+
+}  // namespace
+
+FloodedSet FloodSet(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
+                    const std::function<void(double)>& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  FloodedSet set = Flooder(space, home, settings, progress).Flood();
+  set.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return set;
+}
+
+}  // namespace mbv

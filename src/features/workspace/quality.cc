@@ -1,0 +1,417 @@
+#include "features/workspace/quality.h"
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <thread>
+
+#include "kinematics/constraints.h"
+#include "mechanism/reach.h"
+#include "reference/reduced_model.h"
+
+namespace mbv {
+namespace {
+
+constexpr double kRankShare = 1e-9;      // smaller singular values are none
+constexpr double kSingularShare = 1e-12; // of D: no (1)
+constexpr double kStiffnessStep = 1e-5;  // [rad, characteristic lengths]
+constexpr size_t kBlock = 64;            // poses that one search goes through
+constexpr Eigen::Index kMostDrives = 12; // of corners
+
+// Reach of {K ṁ : |ṁ_i| ≤ 1} within the space that K spans: least and largest.
+std::pair<double, double> ZonotopeReach(const MatX& K) {
+  const Eigen::JacobiSVD<MatX> svd(K, Eigen::ComputeThinU);
+  const VecX sigma = svd.singularValues();
+  if (!(sigma[0] > 0.0)) return {0.0, 0.0};
+  const auto rank = (sigma.array() > kRankShare * sigma[0]).count();
+  const MatX G = svd.matrixU().leftCols(rank).transpose() * K;
+  const Eigen::Index n = G.cols();
+  if (n > kMostDrives) return {kNan, kNan};
+  double most = 0.0, least = std::numeric_limits<double>::infinity();
+  for (long corner = 0; corner < (1L << n); ++corner) {
+    VecX sum = VecX::Zero(rank);
+    for (Eigen::Index i = 0; i < n; ++i) sum += ((corner >> i) & 1 ? 1.0 : -1.0) * G.col(i);
+    most = std::max(most, sum.norm());
+  }
+  // Facets' normals.
+  const auto offer = [&](VecX normal) {
+    if (!(normal.norm() > kRankShare * sigma[0])) return;
+    normal.normalize();
+    least = std::min(least, (normal.transpose() * G).cwiseAbs().sum());
+  };
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (rank == 1) offer(VecX::Ones(1));
+    if (rank == 2) offer(Eigen::Vector2d(-G(1, i), G(0, i)));
+    for (Eigen::Index j = 0; rank == 3 && j < i; ++j) {
+      offer(Vec3(G.col(i)).cross(Vec3(G.col(j))));
+    }
+  }
+  return {least, most};
+}
+
+// Reach of {f : |k_i·f| ≤ 1} within the space that the k_i (columns) span.
+std::pair<double, double> PolytopeReach(const MatX& K) {
+  const Eigen::JacobiSVD<MatX> svd(K, Eigen::ComputeThinU);
+  const VecX sigma = svd.singularValues();
+  if (!(sigma[0] > 0.0)) return {kNan, kNan};
+  const auto rank = (sigma.array() > kRankShare * sigma[0]).count();
+  const MatX G = svd.matrixU().leftCols(rank).transpose() * K;
+  const Eigen::Index n = G.cols();
+  const double least = 1.0 / G.colwise().norm().maxCoeff();
+  double most = 0.0;
+  std::vector<Eigen::Index> chosen(static_cast<size_t>(rank));
+  const auto corners = [&](auto&& self, size_t depth, Eigen::Index from) -> void {
+    if (depth == chosen.size()) {
+      MatX A(rank, rank);
+      for (Eigen::Index r = 0; r < rank; ++r) A.row(r) = G.col(chosen[static_cast<size_t>(r)]);
+      const Eigen::FullPivLU<MatX> lu(A);
+      if (!lu.isInvertible()) return;
+      for (int signs = 0; signs < (1 << rank); ++signs) {
+        VecX b(rank);
+        for (Eigen::Index r = 0; r < rank; ++r) b[r] = (signs >> r) & 1 ? 1.0 : -1.0;
+        const VecX f = lu.solve(b);
+        if ((G.transpose() * f).cwiseAbs().maxCoeff() < 1.0 + 1e-9) most = std::max(most, f.norm());
+      }
+      return;
+    }
+    for (Eigen::Index i = from; i < n; ++i) {
+      chosen[depth] = i;
+      self(self, depth + 1, i + 1);
+    }
+  };
+  corners(corners, 0, 0);
+  return {least, most};
+}
+
+struct Limits {
+  VecX speed, force;  ///< per drive; 1 without motors
+  bool speeds = false, forces = false;
+};
+Limits LimitsOf(const Mechanism& m) {
+  const auto n = static_cast<Eigen::Index>(m.drives.size());
+  Limits limits{VecX::Constant(n, kNan), VecX::Constant(n, kNan)};
+  for (const Motor& motor : m.motors) {
+    const double torque = ContinuousTorque(motor, 0.0);
+    const double most = std::isfinite(torque) ? torque : PeakTorque(motor, 0.0);
+    if (std::isfinite(most)) limits.force[motor.drive] = most * motor.gear_ratio * motor.efficiency;
+    double fastest = motor.max_speed;
+    if (!motor.peak_curve.empty()) fastest = std::min(fastest, motor.peak_curve.back().speed);
+    if (std::isfinite(fastest)) limits.speed[motor.drive] = fastest / motor.gear_ratio;
+  }
+  limits.speeds = n > 0 && limits.speed.allFinite();
+  limits.forces = n > 0 && limits.force.allFinite();
+  if (!limits.speeds) limits.speed.setOnes();
+  if (!limits.forces) limits.force.setOnes();
+  return limits;
+}
+
+class QualityMapper {
+ public:
+  QualityMapper(const SetQuestion& question, const ReachableSet& set, const std::string& output)
+      : mechanism_(question.mechanism),
+        settings_(question.settings),
+        set_(set),
+        length_(CharacteristicLength(mechanism_)),
+        limits_(LimitsOf(mechanism_)),
+        output_(mechanism_.outputs[static_cast<size_t>(mechanism_.FindOutput(output))]) {
+    for (size_t k = 0; k < settings_.coordinates.size(); ++k) {
+      coordinates_.push_back(settings_.coordinates[k].coordinate);
+      if (coordinates_.back().kind != Coordinate::Kind::kPrescribed) {
+        moving_.push_back(static_cast<Eigen::Index>(k));
+      }
+    }
+    for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+      servos_ = servos_ && std::isfinite(mechanism_.drives[d].stiffness);
+      drive_unit_.push_back(PositionUnit(mechanism_, mechanism_.drives[d]) == "m" ? 1.0 : length_);
+    }
+    servos_ = servos_ && !mechanism_.drives.empty();
+    FindPoints();
+    AddIndices();
+  }
+
+  [[nodiscard]] std::string WhyNone() const {
+    if (moving_.size() == mechanism_.drives.size()) return "";
+    return fmt::format("{} drives for {} degrees of freedom: qualities are those of mechanisms with "
+                       "as many drives",
+                       mechanism_.drives.size(), moving_.size());
+  }
+  [[nodiscard]] const std::vector<QualityIndex>& indices() const { return indices_; }
+
+  // All values of a pose; NaN of what is not defined.
+  [[nodiscard]] bool Evaluate(ReducedModel* model, const VecX& at, VecX* values) const {
+    *values = VecX::Constant(static_cast<Eigen::Index>(indices_.size()), kNan);
+    const VecX still = VecX::Zero(model->size());
+    if (!model->Move(at, still, still).ok()) return false;
+    MatX all;
+    if (!model->Motions(&all).ok()) return false;
+    const auto n = static_cast<Eigen::Index>(moving_.size());
+    MatX T(all.rows(), n);
+    for (Eigen::Index k = 0; k < n; ++k) T.col(k) = all.col(moving_[static_cast<size_t>(k)]);
+    const BodyStates& states = model->states();
+    MatX D = model->DriveRates(T);
+    const MatX W = TwistOf(output_.body, output_.X_BO.translation(), states, T) -
+                   TwistOf(output_.reference_body, ReferencePoint(states), states, T);
+    VecX unit(n);
+    for (Eigen::Index k = 0; k < n; ++k) unit[k] = drive_unit_[static_cast<size_t>(k)];
+    const Eigen::JacobiSVD<MatX> check(unit.asDiagonal() * D);
+    const VecX sizes = check.singularValues();
+    size_t i = 0;
+    const auto put = [&](double value) { (*values)[static_cast<Eigen::Index>(i++)] = value; };
+    if (!(sizes[n - 1] > kSingularShare * sizes[0])) {
+      put(0.0);
+      return true;
+    }
+    const MatX back = D.partialPivLu().inverse();
+    const MatX K = W * back;
+    // (4)
+    MatX S(3 * static_cast<Eigen::Index>(points_.size()), n);
+    for (size_t p = 0; p < points_.size(); ++p) {
+      S.middleRows<3>(3 * static_cast<Eigen::Index>(p)) =
+          TwistOf(output_.body, points_[p], states, T).bottomRows<3>();
+    }
+    S *= back * unit.cwiseInverse().asDiagonal() /
+         std::sqrt(static_cast<double>(points_.size()));
+    const VecX rms = Eigen::JacobiSVD<MatX>(S).singularValues();
+    put(rms[0] > 0.0 ? 1.0 / rms[0] : kNan);
+    put(rms[rms.size() - 1]);
+    // Twists with lengths by the characteristic one, drives in units of theirs.
+    MatX scaled = K * unit.cwiseInverse().asDiagonal();
+    scaled.topRows<3>() *= length_;
+    const VecX sigma = Eigen::JacobiSVD<MatX>(scaled).singularValues();
+    const auto rank = (sigma.array() > kRankShare * sigma[0]).count();
+    put(rank == n ? sigma[0] / sigma[n - 1] : kNan);
+    put(rank == n ? sigma.prod() : 0.0);
+    const MatX by_speed = K * limits_.speed.asDiagonal();
+    const MatX by_force = K * limits_.force.cwiseInverse().asDiagonal();
+    for (const bool translation : {true, false}) {
+      const Eigen::Index first = translation ? 3 : 0;
+      const auto [slow, fast] = ZonotopeReach(by_speed.middleRows<3>(first));
+      const auto [weak, strong] = PolytopeReach(by_force.middleRows<3>(first));
+      for (const double value : {slow, fast, weak, strong}) put(value);
+    }
+    // (5)
+    const MatX M_d = back.transpose() * model->MassMatrix(T) * back;
+    for (Eigen::Index k = 0; k < n; ++k) put(M_d(k, k));
+    const VecX held = back.transpose() * model->Forces(T, {});
+    if (limits_.forces) put(Payload(held, -K.bottomRows<3>().transpose() * mechanism_.gravity_W));
+    if (servos_) put(Frequency(model, at, D, M_d));
+    return true;
+  }
+
+ private:
+  void FindPoints() {
+    for (const Joint& joint : mechanism_.joints) {
+      if (joint.kind == JointKind::kFree) continue;
+      if (joint.parent == output_.body) points_.push_back(joint.X_PF.translation());
+      if (joint.child == output_.body) points_.push_back(joint.X_CM.translation());
+    }
+    for (const Drive& drive : mechanism_.drives) {
+      const auto* line = std::get_if<DistanceDrive>(&drive.kind);
+      if (line == nullptr) continue;
+      if (line->body_from == output_.body) points_.push_back(line->p_from);
+      if (line->body_to == output_.body) points_.push_back(line->p_to);
+    }
+    points_.push_back(output_.X_BO.translation());
+  }
+
+  void Add(std::string name, std::string unit, std::string about, bool low_is_bad = true) {
+    indices_.push_back({std::move(name), std::move(unit), std::move(about), low_is_bad});
+  }
+  void AddIndices() {
+    const std::string speed = limits_.speeds ? "at the motors' highest speeds" : "per unit speed of each drive";
+    const std::string force = limits_.forces ? "at the motors' torques" : "per unit force of each drive";
+    Add("type2_distance", "1", "least speed of the drives by that of the output's body (type 2)");
+    Add("type1_distance", "1", "least speed of the output's body by that of the drives (type 1)");
+    Add("condition", "1", fmt::format("of the twist by the drives' speeds, lengths by {:.4g} m", length_), false);
+    Add("manipulability", "1", "product of its singular values");
+    Add("speed_least", "m/s", "in every direction, " + speed);
+    Add("speed_most", "m/s", "in the best direction, " + speed);
+    Add("force_least", "N", "in every direction, " + force);
+    Add("force_most", "N", "in the best direction, " + force);
+    Add("turn_least", "rad/s", "about every axis, " + speed);
+    Add("turn_most", "rad/s", "about the best axis, " + speed);
+    Add("moment_least", "N m", "about every axis, " + force);
+    Add("moment_most", "N m", "about the best axis, " + force);
+    for (const Drive& drive : mechanism_.drives) {
+      Add("mass_" + drive.name, PositionUnit(mechanism_, drive) == "m" ? "kg" : "kg m²",
+          "as the drive feels it, the others at rest", false);
+    }
+    if (limits_.forces) Add("payload", "kg", "at the output's origin, held by the motors");
+    if (servos_) Add("frequency", "Hz", "lowest natural frequency on the servos");
+  }
+
+  // World twist of a body's point: 6 × n.
+  [[nodiscard]] static MatX TwistOf(int body, const Vec3& p_BP, const BodyStates& states,
+                                    const MatX& T) {
+    if (body == 0) return MatX::Zero(6, T.cols());
+    MatX W = T.middleRows<6>(6 * (body - 1));
+    const Vec3 p = states.X_WB[static_cast<size_t>(body)].linear() * p_BP;
+    for (Eigen::Index k = 0; k < W.cols(); ++k) {
+      W.col(k).tail<3>() += Vec3(W.col(k).head<3>()).cross(p);
+    }
+    return W;
+  }
+  // The output's origin in its reference body.
+  [[nodiscard]] Vec3 ReferencePoint(const BodyStates& states) const {
+    const Vec3 p_W = states.X_WB[static_cast<size_t>(output_.body)] * output_.X_BO.translation();
+    return states.X_WB[static_cast<size_t>(output_.reference_body)].inverse() * p_W;
+  }
+
+  // (7)
+  [[nodiscard]] double Payload(const VecX& held, const VecX& per_mass) const {
+    double most = std::numeric_limits<double>::infinity();
+    for (Eigen::Index k = 0; k < held.size(); ++k) {
+      const double left = limits_.force[k] - std::abs(held[k]);
+      if (left < 0.0) return 0.0;
+      if (per_mass[k] == 0.0) continue;
+      const double room = per_mass[k] > 0.0 ? limits_.force[k] - held[k] : limits_.force[k] + held[k];
+      most = std::min(most, room / std::abs(per_mass[k]));
+    }
+    return std::isfinite(most) ? most : kNan;
+  }
+
+  // (6), with the coordinates' steps carried over to the drives.
+  [[nodiscard]] double Frequency(ReducedModel* model, const VecX& at, const MatX& D,
+                                 const MatX& M_d) const {
+    const auto n = static_cast<Eigen::Index>(moving_.size());
+    const VecX still = VecX::Zero(model->size());
+    MatX slope(n, n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      std::array<VecX, 2> force;
+      const Eigen::Index column = moving_[static_cast<size_t>(k)];
+      const double step = kStiffnessStep * (IsLength(mechanism_, coordinates_[static_cast<size_t>(column)]) ? length_ : 1.0);
+      for (size_t s = 0; s < 2; ++s) {
+        VecX q = at;
+        q[column] += s == 0 ? -step : step;
+        MatX all;
+        if (!model->Move(q, still, still).ok() || !model->Motions(&all).ok()) return kNan;
+        MatX T(all.rows(), n);
+        for (Eigen::Index j = 0; j < n; ++j) T.col(j) = all.col(moving_[static_cast<size_t>(j)]);
+        force.at(s) = model->DriveRates(T).transpose().partialPivLu().solve(model->Forces(T, {}));
+      }
+      slope.col(k) = (force[1] - force[0]) / (2 * step);
+    }
+    MatX K_d = slope * D.inverse();
+    K_d = 0.5 * (K_d + K_d.transpose()).eval();
+    for (Eigen::Index d = 0; d < n; ++d) {
+      K_d(d, d) += mechanism_.drives[static_cast<size_t>(d)].stiffness;
+    }
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatX> modes(K_d, M_d, Eigen::EigenvaluesOnly);
+    if (modes.info() != Eigen::Success) return kNan;
+    const double lowest = modes.eigenvalues()[0];
+    return lowest > 0.0 ? std::sqrt(lowest) / (2 * std::numbers::pi) : 0.0;
+  }
+
+  const Mechanism& mechanism_;
+  const SpaceSettings& settings_;
+  const ReachableSet& set_;
+  const double length_;
+  const Limits limits_;
+  const Output& output_;
+  std::vector<Coordinate> coordinates_;
+  std::vector<Eigen::Index> moving_;
+  std::vector<double> drive_unit_;
+  std::vector<Vec3> points_;
+  std::vector<QualityIndex> indices_;
+  bool servos_ = true;
+};
+
+void Summarise(const ReachableSet& set, QualityMap* map) {
+  // Every second pose along each coordinate.
+  const auto is_coarse = [&](const Vec3& at) {
+    for (size_t c = 0; c < set.over.size(); ++c) {
+      const auto k = static_cast<Eigen::Index>(c);
+      const double spacing = set.flooded.lattice_step.at(c);
+      if (std::lround((at[k] - set.start[k]) / spacing) % 2 != 0) return false;
+    }
+    return true;
+  };
+  for (size_t i = 0; i < map->indices.size(); ++i) {
+    QualityIndex& index = map->indices[i];
+    double sum = 0.0, coarse = 0.0, count = 0.0, coarse_count = 0.0;
+    for (size_t p = 0; p < map->points.size(); ++p) {
+      const double value = map->values[p][static_cast<Eigen::Index>(i)];
+      if (!std::isfinite(value)) continue;
+      const Vec3& at = set.flooded.lattice[map->points[p]].at;
+      sum += value;
+      count += 1.0;
+      if (is_coarse(at)) {
+        coarse += value;
+        coarse_count += 1.0;
+      }
+      if (!(value >= index.least)) {
+        index.least = value;
+        index.least_at = at;
+      }
+      if (!(value <= index.most)) {
+        index.most = value;
+        index.most_at = at;
+      }
+    }
+    if (count > 0.0) index.mean = sum / count;
+    if (coarse_count > 0.0) index.mean_error = std::abs(index.mean - coarse / coarse_count);
+  }
+}
+
+}  // namespace
+
+QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,
+                      const std::string& output, int threads,
+                      const std::function<void(double)>& progress) {
+  QualityMap map;
+  map.output = output;
+  if (question.mechanism.FindOutput(output) < 0) {
+    map.why_none = "the model has no output";
+    return map;
+  }
+  const QualityMapper mapper(question, set, output);
+  map.why_none = mapper.WhyNone();
+  if (!map.why_none.empty()) return map;
+  map.indices = mapper.indices();
+  std::vector<size_t> inside;
+  for (size_t p = 0; p < set.flooded.lattice.size(); ++p) {
+    if (set.flooded.lattice[p].inside) inside.push_back(p);
+  }
+  std::vector<VecX> values(inside.size());
+  std::vector<Coordinate> coordinates;
+  for (const NamedCoordinate& named : question.settings.coordinates) {
+    coordinates.push_back(named.coordinate);
+  }
+  // Blocks begin at home: nothing depends on the number of threads.
+  const size_t blocks = (inside.size() + kBlock - 1) / kBlock;
+  std::atomic<size_t> next = 0;
+  const auto run = [&](bool reports) {
+    ReducedModel model(question.mechanism, coordinates);
+    for (size_t b = next++; b < blocks; b = next++) {
+      model.Restart();
+      for (size_t i = b * kBlock; i < std::min(inside.size(), (b + 1) * kBlock); ++i) {
+        const VecX& at = set.flooded.lattice[inside[i]].pose.at;
+        if (!mapper.Evaluate(&model, at, &values[i])) values[i].resize(0);
+      }
+      if (reports && progress) progress(static_cast<double>(b) / static_cast<double>(blocks));
+    }
+  };
+  std::vector<std::thread> others;
+  for (int t = 1; t < threads; ++t) others.emplace_back(run, false);
+  run(true);
+  for (std::thread& other : others) other.join();
+  for (size_t i = 0; i < inside.size(); ++i) {
+    if (values[i].size() == 0) {
+      ++map.missed;
+      continue;
+    }
+    map.points.push_back(inside[i]);
+    map.values.push_back(std::move(values[i]));
+  }
+  Summarise(set, &map);
+  return map;
+}
+
+}  // namespace mbv

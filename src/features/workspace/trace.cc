@@ -1,0 +1,821 @@
+#include "features/workspace/trace.h"
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+
+namespace mbv {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+using std::numbers::pi;
+
+constexpr int kDegree = 8;              // of the polynomials along a step
+constexpr double kTail = 1e-9;          // last coefficients by the size of the set
+constexpr double kBeyond = 1e-9;        // margins below −this are outside
+constexpr double kBeside = 1e-6;         // of a difference quotient beside a curve
+constexpr double kLeastStep = 1e-7;     // [rad, characteristic lengths]
+constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
+constexpr double kFar = 200.0;          // a ray that goes on for so long has no end
+constexpr int kMostSteps = 20000;
+constexpr int kRays = 8, kChords = 12;  // from home; from each loop
+constexpr int kMostSections = 1200;
+
+// Root of a continuous function with different signs at both ends (Illinois), to rounding.
+template <typename F>
+double Root(const F& f, double a, double fa, double b, double fb, double tolerance) {
+  if (fa == 0.0) return a;
+  for (int i = 0; i < 80 && std::abs(b - a) > tolerance; ++i) {
+    double c = b - fb * (b - a) / (fb - fa);
+    if (!std::isfinite(c) || i % 16 == 15) c = 0.5 * (a + b);
+    const double fc = f(c);
+    if (!std::isfinite(fc) || fc == 0.0) return c;
+    if ((fc < 0.0) != (fb < 0.0)) {
+      a = b;
+      fa = fb;
+    } else {
+      fa *= 0.5;
+    }
+    b = c;
+    fb = fc;
+  }
+  return b;
+}
+
+// Interpolation in Chebyshev–Lobatto nodes on [0, 1].
+struct Chebyshev {
+  std::array<double, kDegree + 1> node{};
+  Eigen::MatrixXd area;          // ∫ l_a l_b′
+  Eigen::RowVectorXd last, one_before;  // coefficients of T_n and T_{n−1}
+
+  Chebyshev() {
+    constexpr int n = kDegree, fine = 2 * kDegree;
+    Eigen::VectorXd x(n + 1);
+    for (int k = 0; k <= n; ++k) {
+      x[k] = -std::cos(pi * k / n);
+      node.at(static_cast<size_t>(k)) = 0.5 * (1.0 + x[k]);
+    }
+    // Values and derivatives of the Lagrange polynomials at the fine nodes, by T_j.
+    Eigen::MatrixXd V(n + 1, n + 1);
+    for (int k = 0; k <= n; ++k) {
+      for (int j = 0; j <= n; ++j) V(k, j) = std::cos(j * std::acos(std::clamp(x[k], -1.0, 1.0)));
+    }
+    const Eigen::MatrixXd coefficients = V.inverse();
+    last = coefficients.row(n);
+    one_before = coefficients.row(n - 1);
+    Eigen::MatrixXd P(fine + 1, n + 1), Q(fine + 1, n + 1);
+    Eigen::VectorXd weight(fine + 1);
+    for (int k = 0; k <= fine; ++k) {
+      const double theta = pi * k / fine;
+      for (int j = 0; j <= n; ++j) {
+        P(k, j) = std::cos(j * theta);
+        const bool end = k == 0 || k == fine;
+        Q(k, j) = end ? j * j * (k == 0 || j % 2 == 1 ? 1.0 : -1.0)
+                      : j * std::sin(j * theta) / std::sin(theta);
+      }
+      double sum = 1.0;
+      for (int j = 1; j <= fine / 2; ++j) {
+        const double b = j == fine / 2 ? 1.0 : 2.0;
+        sum -= b / (4.0 * j * j - 1.0) * std::cos(2.0 * j * theta);
+      }
+      weight[k] = (k == 0 || k == fine ? 1.0 : 2.0) * sum / fine;
+    }
+    area = (P * coefficients).transpose() * weight.asDiagonal() * (Q * coefficients);
+  }
+};
+const Chebyshev& Nodes() {
+  static const Chebyshev nodes;
+  return nodes;
+}
+
+struct Hit {
+  PlacedPose at;
+  int bound = -1;
+};
+
+Vec2 Turned(const VecX& v) { return {v[1], -v[0]}; }
+
+class Tracer {
+ public:
+  explicit Tracer(PoseSpace space) : space_(std::move(space)) {}
+
+  [[nodiscard]] PoseSpace& space() { return space_; }
+  [[nodiscard]] const std::string& trouble() const { return trouble_; }
+
+  [[nodiscard]] Vec2 ScaledAt(const PlacedPose& placed) const {
+    return {placed.pose.at[0] / space_.UnitOf(0), placed.pose.at[1] / space_.UnitOf(1)};
+  }
+
+  // Along a straight line of the free coordinates to the first bound.
+  std::optional<Hit> Walk(const PlacedPose& from, const VecX& ray, double first = 0.0,
+                          const VecX& first_along = {}) {
+    PlacedPose at = from;
+    double h = kFirstStep, length = 0.0;
+    if (first > 0.0) {
+      PlacedPose next;
+      if (!space_.Step(from, first * first_along, &next)) return std::nullopt;
+      if (next.pose.margin.minCoeff() < 0.0) return std::nullopt;
+      at = std::move(next);
+    }
+    VecX before;
+    for (int i = 0; i < kMostSteps; ++i) {
+      const Eigen::PartialPivLU<MatX> lu(at.C_free);
+      VecX along = lu.solve(ray);
+      if (!along.allFinite()) return std::nullopt;
+      along.normalize();
+      PlacedPose next;
+      while (!space_.Step(at, h * along, &next)) {
+        h *= 0.5;
+        if (h < kLeastStep) {
+          trouble_ = "poses are lost near a singularity of the constraints";
+          return std::nullopt;
+        }
+      }
+      if (next.pose.margin.minCoeff() < 0.0) return Exit(at, along, h, next);
+      length += h;
+      if (length > kFar) {
+        unbounded_ = true;
+        return std::nullopt;
+      }
+      at = std::move(next);
+      h = std::min(1.5 * h, 0.5 * kLargestStep);
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] bool unbounded() const { return unbounded_; }
+
+  // The boundary's loop through a hit.
+  TracedLoop Trace(const Hit& start);
+
+  // A way into the set from a pose on the boundary: tangent along the margin's slope.
+  [[nodiscard]] VecX Inwards(const PlacedPose& at, int bound) const {
+    VecX slope = space_.Slope(at, bound);
+    return slope.norm() > 0.0 ? VecX(slope.normalized()) : slope;
+  }
+  [[nodiscard]] bool Knows(const std::vector<TracedLoop>& loops, const Hit& hit) const;
+  /// All loops that rays and chords from these poses find.
+  bool TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* section,
+                std::vector<SpacePose>* inside);
+
+ private:
+  std::optional<Hit> Exit(const PlacedPose& at, const VecX& along, double h,
+                          const PlacedPose& next) {
+    double first = h;
+    int bound = -1;
+    for (Eigen::Index j = 0; j < next.pose.margin.size(); ++j) {
+      if (next.pose.margin[j] >= 0.0) continue;
+      const auto margin = [&](double s) {
+        PlacedPose there;
+        return space_.Step(at, s * along, &there) ? there.pose.margin[j] : kNan;
+      };
+      const double s = Root(margin, 0.0, std::max(at.pose.margin[j], 0.0), h,
+                            next.pose.margin[j], 1e-14);
+      if (bound >= 0 && s >= first) continue;
+      first = s;
+      bound = static_cast<int>(j);
+    }
+    Hit hit{.at = {}, .bound = bound};
+    if (!space_.Step(at, first * along, &hit.at)) return std::nullopt;
+    return hit;
+  }
+
+  // The pose on the bound's curve at τ along the tangent t.
+  struct Curve {
+    const PlacedPose* base;
+    int bound;
+    VecX t, n;           // n into the set
+    double slope, rate;  // of the margin along n: slope + rate τ, about
+  };
+  bool OnCurve(const Curve& curve, double tau, double* eta, PlacedPose* to) const {
+    double x0 = *eta, f0 = 0.0, x1 = *eta;
+    for (int i = 0; i < 12; ++i) {
+      if (!space_.Step(*curve.base, tau * curve.t + x1 * curve.n, to)) return false;
+      const double f1 = to->pose.margin[curve.bound];
+      double step = -f1 / (curve.slope + curve.rate * tau);
+      if (i > 0 && f1 != f0) step = -f1 * (x1 - x0) / (f1 - f0);
+      if (!std::isfinite(step) || std::abs(step) > 0.5) return false;
+      if (std::abs(step) < 1e-13 || f1 == 0.0) {
+        *eta = x1;
+        return true;
+      }
+      x0 = x1;
+      f0 = f1;
+      x1 += step;
+      if (std::abs(step) < 1e-9 && i > 0) {  // one more, and that is it
+        *eta = x1;
+        return space_.Step(*curve.base, tau * curve.t + x1 * curve.n, to);
+      }
+    }
+    return false;
+  }
+
+  // Along the bound's curve, as `before` goes.
+  [[nodiscard]] VecX DirectionAt(const PlacedPose& at, int bound, const VecX& before) const {
+    const VecX t = Turned(space_.Slope(at, bound).normalized());
+    return (at.N_free * t).dot(before) < 0.0 ? VecX(-t) : t;
+  }
+  // At a crossing, from one branch to the other one's side where the set is; returns the rate at
+  // which the margin's slope along n grows.
+  static double BranchOff(const Eigen::Matrix2d& H, const VecX& along, const VecX& into, VecX* t,
+                          VecX* n) {
+    // Directions y with yᵀ H y = 0, by H's axes.
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(H);
+    const double angle = std::atan(std::sqrt(-axes.eigenvalues()[0] / axes.eigenvalues()[1]));
+    const Vec2 a = axes.eigenvectors().col(0), b = axes.eigenvectors().col(1);
+    Vec2 w1 = std::cos(angle) * a + std::sin(angle) * b;
+    Vec2 w2 = std::cos(angle) * a - std::sin(angle) * b;
+    const Vec2 way = along.normalized();
+    if (std::abs(w1.dot(way)) > std::abs(w2.dot(way))) std::swap(w1, w2);
+    if (w1.dot(Vec2(into)) < 0.0) w1 = -w1;
+    Vec2 normal(-w1[1], w1[0]);
+    if (normal.dot(way) > 0.0) normal = -normal;
+    *t = w1;
+    *n = normal;
+    return std::abs(normal.dot(H * w1));
+  }
+  // Slope of the bound's margin along n beside the curve.
+  [[nodiscard]] double Across(const Curve& curve, double tau, double eta,
+                              const PlacedPose& node) const {
+    PlacedPose beside;
+    if (!space_.Step(*curve.base, tau * curve.t + (eta + kBeside) * curve.n, &beside)) return kNan;
+    return (beside.pose.margin[curve.bound] - node.pose.margin[curve.bound]) / kBeside;
+  }
+  // Second derivatives of a margin, and its slope.
+  bool Curvature(const PlacedPose& at, int bound, Eigen::Matrix2d* H, Vec2* slope) const {
+    constexpr double h = 1e-3;
+    std::array<std::array<double, 3>, 3> f{};
+    for (int i = -1; i <= 1; ++i) {
+      for (int j = -1; j <= 1; ++j) {
+        PlacedPose there;
+        if (!space_.Step(at, Vec2(h * i, h * j), &there)) return false;
+        f.at(static_cast<size_t>(i + 1)).at(static_cast<size_t>(j + 1)) = there.pose.margin[bound];
+      }
+    }
+    (*H)(0, 0) = (f[2][1] - 2 * f[1][1] + f[0][1]) / (h * h);
+    (*H)(1, 1) = (f[1][2] - 2 * f[1][1] + f[1][0]) / (h * h);
+    (*H)(0, 1) = (*H)(1, 0) = (f[2][2] - f[2][0] - f[0][2] + f[0][0]) / (4 * h * h);
+    *slope = space_.Slope(at, bound);
+    return true;
+  }
+  // The pose where two branches of {margin = 0} cross: its slope vanishes.
+  bool Crossing(const PlacedPose& near, int bound, PlacedPose* at, Eigen::Matrix2d* H) const {
+    *at = near;
+    for (int i = 0; i < 12; ++i) {
+      Vec2 slope;
+      if (!Curvature(*at, bound, H, &slope)) return false;
+      const VecX step = -H->inverse() * slope;
+      if (!step.allFinite() || step.norm() > kLargestStep) return false;
+      PlacedPose next;
+      if (!space_.Step(*at, step, &next)) return false;
+      *at = std::move(next);
+      if (step.norm() < 1e-10) return H->determinant() < 0.0;
+    }
+    return false;
+  }
+
+  PoseSpace space_;
+  std::string trouble_;
+  bool unbounded_ = false;
+};
+
+// All nodes of a step; the first one is the base.
+TracedLoop Tracer::Trace(const Hit& start) {
+  TracedLoop loop;
+  Hit here = start;
+  const Chebyshev& nodes = Nodes();
+  VecX slope = space_.Slope(here.at, here.bound);
+  if (!(slope.norm() > 1e-12)) {
+    trouble_ = "a bound's margin has no slope: " +
+               space_.bounds()[static_cast<size_t>(here.bound)].name;
+    return loop;
+  }
+  VecX t = Turned(slope.normalized());
+  const Vec2 x_start = ScaledAt(here.at);
+  Vec2 along_start = here.at.C_free * t;
+  along_start = {along_start[0] / space_.UnitOf(0), along_start[1] / space_.UnitOf(1)};
+  along_start.normalize();
+  // Is the set to the left? Folds look the same way from both sides.
+  double left = 0.0;
+  {
+    PlacedPose in;
+    if (!space_.Step(here.at, 1e-3 * slope.normalized(), &in)) return loop;
+    const Vec2 d = ScaledAt(in) - x_start;
+    left = along_start[0] * d[1] - along_start[1] * d[0] > 0.0 ? 1.0 : -1.0;
+  }
+  double h = kFirstStep, size = 1e-3;
+  double area = 0.0, error = 0.0;
+  VecX n = slope.normalized();
+  double s0 = slope.norm(), rate = 0.0;
+  loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
+  enum class Event { kNone, kCorner, kCloses, kCrossing };
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Curve curve{&here.at, here.bound, t, n, s0, rate};
+    const bool singular =
+        IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
+    std::array<PlacedPose, kDegree + 1> at;
+    at[0] = here.at;
+    std::array<double, kDegree + 1> eta{};
+    PlacedPose crossing;
+    Eigen::Matrix2d H;
+    Event event = Event::kNone;
+    int corner = -1;
+    bool failed = false;
+    // First to find what ends the step, then to its end.
+    for (int attempt = 0; attempt < 2; ++attempt) {
+      double end = h;
+      for (size_t k = 1; k <= kDegree && !failed; ++k) {
+        if (attempt > 0 && event == Event::kCrossing && k == kDegree) {
+          at.at(k) = crossing;
+          break;
+        }
+        const double tau = h * nodes.node.at(k);
+        double e = k > 1 ? eta.at(k - 1) * std::pow(nodes.node.at(k) / nodes.node.at(k - 1), 2)
+                         : 0.0;
+        failed = !OnCurve(curve, tau, &e, &at.at(k));
+        eta.at(k) = e;
+        if (failed || attempt > 0) continue;
+        const double before = h * nodes.node.at(k - 1);
+        double first = std::numeric_limits<double>::infinity();
+        const auto find = [&](const auto& value, double f0, double f1) {
+          const auto f = [&](double s) {
+            double guess = e * std::pow(s / tau, 2);
+            PlacedPose there;
+            return OnCurve(curve, s, &guess, &there) ? value(there) : kNan;
+          };
+          return f0 > 0.0 ? Root(f, before, f0, tau, f1, 1e-14) : before;
+        };
+        for (Eigen::Index j = 0; j < at.at(k).pose.margin.size(); ++j) {
+          if (j == here.bound || at.at(k).pose.margin[j] >= -kBeyond) continue;
+          const double s = find([&](const PlacedPose& p) { return p.pose.margin[j]; },
+                                at.at(k - 1).pose.margin[j], at.at(k).pose.margin[j]);
+          if (s >= first) continue;
+          first = s;
+          corner = static_cast<int>(j);
+          event = Event::kCorner;
+        }
+        if (singular && Across(curve, tau, e, at.at(k)) < 0.0) {
+          // Another branch of the same singularity crosses.
+          if (!Crossing(at.at(k), here.bound, &crossing, &H)) {
+            failed = true;
+            break;
+          }
+          const Vec2 there = ScaledAt(crossing);
+          Vec2 way = ScaledAt(at.at(k)) - ScaledAt(at.at(k - 1));
+          way.normalize();
+          const auto passed = [&](const PlacedPose& p) { return (there - ScaledAt(p)).dot(way); };
+          const double f1 = passed(at.at(k)), f0 = passed(at.at(k - 1));
+          const double s = f1 <= 0.0 ? find(passed, f0, f1) : tau;
+          if (s < first) {
+            first = s;
+            event = Event::kCrossing;
+          }
+        }
+        const auto passed = [&](const PlacedPose& p) {
+          return -(ScaledAt(p) - x_start).dot(along_start);
+        };
+        if (here.bound == start.bound && (step > 0 || k > 3) && passed(at.at(k - 1)) > 0.0 &&
+            passed(at.at(k)) <= 0.0) {
+          const double s = find(passed, passed(at.at(k - 1)), passed(at.at(k)));
+          double guess = e * std::pow(s / tau, 2);
+          PlacedPose there;
+          if (s < first && OnCurve(curve, s, &guess, &there) &&
+              (ScaledAt(there) - x_start).norm() < 1e-6) {
+            first = s;
+            event = Event::kCloses;
+          }
+        }
+        if (event != Event::kNone) {
+          end = first;
+          break;
+        }
+      }
+      if (failed || event == Event::kNone) break;
+      if (attempt == 0) h = end;
+      if (h < 1e-13) break;
+    }
+    if (!failed && h >= 1e-13) {
+      Eigen::Matrix<double, 2, kDegree + 1> x;
+      for (size_t k = 0; k <= kDegree; ++k) {
+        x.col(static_cast<Eigen::Index>(k)) = ScaledAt(at.at(k));
+      }
+      size = std::max(size, (x.colwise() - x_start).colwise().norm().maxCoeff());
+      const Vec2 tail = (x * nodes.last.transpose()).cwiseAbs() +
+                        (x * nodes.one_before.transpose()).cwiseAbs();
+      failed = tail.maxCoeff() > kTail * size && h > kLeastStep;
+      if (!failed) {
+        const Vec2 span = x.rowwise().maxCoeff() - x.rowwise().minCoeff();
+        // From the start: less rounding.
+        const Eigen::Matrix<double, 2, kDegree + 1> y = x.colwise() - x_start;
+        area += 0.5 * (y.row(0) * nodes.area * y.row(1).transpose() -
+                       y.row(1) * nodes.area * y.row(0).transpose())
+                          .value();
+        error += tail[0] * span[1] + tail[1] * span[0] + 1e-12 * span.norm() * size;
+        for (size_t k = 1; k <= kDegree; ++k) {
+          loop.arcs.back().points.emplace_back(at.at(k).pose.at.head<2>());
+        }
+      }
+    }
+    if (failed) {
+      h *= 0.5;
+      if (h < kLeastStep) {
+        trouble_ = "the boundary on " +
+                   space_.bounds()[static_cast<size_t>(here.bound)].name + " is lost";
+        return loop;
+      }
+      continue;
+    }
+    // Directions here and at the last node before, in the tangents of the step's end.
+    PlacedPose& last = at[kDegree - 1];
+    const VecX carried = here.at.N_free * t;
+    const VecX along = last.N_free * DirectionAt(last, here.bound, carried);
+    const VecX into = last.N_free * space_.Slope(last, here.bound);
+    if (h >= 1e-13) here.at = std::move(at[kDegree]);
+    if (event == Event::kCloses) {
+      loop.closed = true;
+      break;
+    }
+    s0 = rate = 0.0;
+    if (event == Event::kCrossing) {
+      const MatX back = here.at.N_free.transpose();
+      rate = BranchOff(H, back * along, back * into, &t, &n);
+      loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
+      h = kFirstStep;
+      continue;
+    }
+    if (event == Event::kCorner) {
+      const VecX old = space_.Slope(here.at, here.bound);
+      here.bound = corner;
+      t = Turned(space_.Slope(here.at, corner).normalized());
+      if (t.dot(old) < 0.0) t = -t;
+      loop.arcs.push_back({corner, {here.at.pose.at.head<2>()}});
+      h = kFirstStep;
+    } else {
+      t = DirectionAt(here.at, here.bound, carried);
+      h = std::min(1.6 * h, kLargestStep);
+    }
+    slope = space_.Slope(here.at, here.bound);
+    s0 = slope.norm();
+    n = slope.normalized();
+    if (!(s0 > 1e-12)) break;
+  }
+  const double unit = space_.UnitOf(0) * space_.UnitOf(1);
+  loop.area = left * area * unit;
+  loop.error = error * unit;
+  if (!loop.closed && trouble_.empty()) trouble_ = "a boundary does not close";
+  return loop;
+}
+
+bool Tracer::Knows(const std::vector<TracedLoop>& loops, const Hit& hit) const {
+  const Vec2 unit(space_.UnitOf(0), space_.UnitOf(1));
+  const Vec2 p = hit.at.pose.at.head<2>().cwiseQuotient(unit);
+  for (const TracedLoop& loop : loops) {
+    for (const TracedArc& arc : loop.arcs) {
+      for (size_t k = 1; k < arc.points.size(); ++k) {
+        const Vec2 a = arc.points[k - 1].cwiseQuotient(unit), b = arc.points[k].cwiseQuotient(unit);
+        const double length = (b - a).norm();
+        const double s = length > 0.0 ? std::clamp((p - a).dot(b - a) / (length * length), 0.0, 1.0)
+                                      : 0.0;
+        if ((a + s * (b - a) - p).norm() < 0.1 * length + 1e-9) return true;
+      }
+    }
+  }
+  return false;
+}
+
+// Even and odd crossings of a line to the right.
+bool IsInside(const std::vector<TracedLoop>& loops, const Vec2& p) {
+  bool inside = false;
+  for (const TracedLoop& loop : loops) {
+    for (const TracedArc& arc : loop.arcs) {
+      for (size_t k = 1; k < arc.points.size(); ++k) {
+        const Vec2 &a = arc.points[k - 1], &b = arc.points[k];
+        if ((a[1] > p[1]) == (b[1] > p[1])) continue;
+        if (p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])) inside = !inside;
+      }
+    }
+  }
+  return inside;
+}
+
+bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* section,
+                      std::vector<SpacePose>* inside) {
+  std::vector<std::pair<Hit, size_t>> chords;  // from where on which loop
+  const auto offer = [&](const Hit& hit) {
+    if (Knows(section->loops, hit)) return true;
+    trouble_.clear();
+    TracedLoop loop = Trace(hit);
+    if (!loop.closed) return false;
+    section->loops.push_back(std::move(loop));
+    chords.emplace_back(hit, section->loops.size() - 1);
+    return true;
+  };
+  for (const PlacedPose& seed : seeds) {
+    if (IsInside(section->loops, seed.pose.at.head<2>())) continue;
+    inside->push_back(seed.pose);
+    const int rays = section->loops.empty() && !std::isfinite(section->height) ? kRays : 1;
+    for (int k = 0; k < rays; ++k) {
+      const double angle = 0.3 + 2 * pi * k / rays;
+      const VecX ray = Vec2(std::cos(angle) * space_.UnitOf(0), std::sin(angle) * space_.UnitOf(1));
+      const auto hit = Walk(seed, ray);
+      if (!hit || !offer(*hit)) return false;
+    }
+  }
+  // Chords from points of each loop, found by rays from its first one.
+  for (size_t c = 0; c < chords.size(); ++c) {
+    const Hit from = chords[c].first;
+    const VecX in = Inwards(from.at, from.bound);
+    PlacedPose near;
+    double first = 1e-3;
+    while (first > 1e-9 && !(space_.Step(from.at, first * in, &near) &&
+                             near.pose.margin.minCoeff() > 0.0)) {
+      first *= 0.1;
+    }
+    if (first <= 1e-9) continue;
+    const int count = std::isfinite(section->height) ? 3 : kChords;
+    for (int k = 0; k < count; ++k) {
+      const double angle = 0.1 + 2 * pi * k / count;
+      const VecX ray = Vec2(std::cos(angle) * space_.UnitOf(0), std::sin(angle) * space_.UnitOf(1));
+      const auto hit = Walk(near, ray);
+      if (!hit || !offer(*hit)) continue;
+      // Halfway between the two ends.
+      PlacedPose half;
+      VecX target = near.pose.at;
+      target.head<2>() = 0.5 * (near.pose.at.head<2>() + hit->at.pose.at.head<2>());
+      if (space_.Close(near, target, &half) && half.pose.margin.minCoeff() > 0.0) {
+        inside->push_back(half.pose);
+        if (!std::isfinite(section->height) && k < 4) {
+          const VecX across = Vec2(-ray[1] / space_.UnitOf(1) * space_.UnitOf(0),
+                                   ray[0] / space_.UnitOf(0) * space_.UnitOf(1));
+          for (const double sign : {1.0, -1.0}) {
+            const auto other = Walk(half, sign * across);
+            if (other) (void)offer(*other);
+          }
+        }
+      }
+    }
+  }
+  section->area = section->error = 0.0;
+  for (const TracedLoop& loop : section->loops) {
+    section->area += loop.area;
+    section->error += loop.error;
+  }
+  trouble_.clear();
+  return !section->loops.empty();
+}
+
+// Sections of a solid and their integral.
+class SolidTracer {
+ public:
+  SolidTracer(const PoseSpace& space, const PlacedPose& home,
+              const std::function<void(double)>& progress, double share)
+      : solid_(space), flat_(space.Section(2)), progress_(progress), share_(share) {
+    seeds_.emplace(home.pose.at[2], std::vector<SpacePose>{home.pose});
+  }
+
+  TracedSet Trace(const PlacedPose& home) {
+    TracedSet set;
+    set.low = Climb(home, -1.0);
+    set.high = Climb(home, 1.0);
+    if (!(set.high > set.low)) {
+      set.summary.stop = solid_.unbounded() ? Stop::kUnreachable : Stop::kNoConvergence;
+      set.summary.message = Trouble();
+      return set;
+    }
+    Integrate(&set);
+    if (!lost_.empty()) {
+      set.summary.stop = Stop::kNoConvergence;
+      set.summary.message = lost_;
+    } else {
+      set.summary = RunSummary::Done();
+    }
+    for (auto& [height, section] : sections_) set.sections.push_back(std::move(section));
+    for (const auto& [height, poses] : seeds_) {
+      if (!poses.empty()) set.inside.push_back(poses.back());
+    }
+    set.closings = flat_.space().closings() + solid_.space().closings();
+    return set;
+  }
+  [[nodiscard]] bool unbounded() const { return solid_.unbounded() || flat_.unbounded(); }
+
+ private:
+  [[nodiscard]] std::string Trouble() const {
+    return !flat_.trouble().empty() ? flat_.trouble() : solid_.trouble();
+  }
+
+  // Up (or down) to the last section that there is.
+  double Climb(const PlacedPose& home, double sign) {
+    PlacedPose at = home;
+    double best = at.pose.at[2], first = 0.0;
+    for (int i = 0; i < 60; ++i) {
+      const VecX up = sign * solid_.space().UnitOf(2) * VecX::Unit(3, 2);
+      const auto hit = solid_.Walk(at, up);
+      if (!hit) return kNan;
+      const double gain = sign * (hit->at.pose.at[2] - best);
+      if (i > 0 && !(gain > 0.0)) break;
+      best = hit->at.pose.at[2];
+      first = std::max(first, gain);
+      if (i > 0 && gain < 1e-7 * first) break;
+      // A little below, where there is room, from the middle of the section.
+      const double below = best - sign * std::max(1e-3 * gain, 1e-9 * first);
+      PlacedPose low;
+      VecX target = at.pose.at;
+      target[2] = below;
+      if (!solid_.space().Close(at, target, &low) || low.pose.margin.minCoeff() < 0.0) break;
+      seeds_[below].push_back(low.pose);
+      (void)AreaAt(below);
+      const auto& found = seeds_[below];
+      const SpacePose* middle = &low.pose;
+      double room = -1.0;
+      for (const SpacePose& pose : found) {
+        // The widest margin, each by how much it has at home.
+        double least = std::numeric_limits<double>::infinity();
+        for (Eigen::Index j = 0; j < pose.margin.size(); ++j) {
+          least = std::min(least, pose.margin[j] / std::max(home.pose.margin[j], 1e-12));
+        }
+        if (least > room) {
+          room = least;
+          middle = &pose;
+        }
+      }
+      if (!solid_.space().Place(*middle, &at)) break;
+    }
+    return best;
+  }
+
+  double AreaAt(double height) {
+    if (const auto known = sections_.find(height); known != sections_.end()) {
+      return known->second.area;
+    }
+    TracedSection section;
+    section.height = height;
+    flat_.space().Hold(2, height);
+    // From the nearest poses first.
+    std::vector<std::pair<double, const SpacePose*>> near;
+    for (const auto& [z, poses] : seeds_) {
+      for (const SpacePose& pose : poses) near.emplace_back(std::abs(z - height), &pose);
+    }
+    std::ranges::stable_sort(near, {}, [](const auto& pair) { return pair.first; });
+    std::vector<PlacedPose> seeds;
+    for (size_t k = 0; k < near.size() && (k < 8 || (seeds.empty() && k < 200)); ++k) {
+      PlacedPose from, to;
+      if (!flat_.space().Place(*near[k].second, &from)) continue;
+      VecX target = from.pose.at;
+      target[2] = height;
+      if (!flat_.space().Close(from, target, &to) || to.pose.margin.minCoeff() <= 0.0) continue;
+      seeds.push_back(std::move(to));
+    }
+    std::vector<SpacePose> inside;
+    if (!seeds.empty() && !flat_.TraceAll(seeds, &section, &inside) && lost_.empty()) {
+      lost_ = fmt::format("section at {:.6g}: {}", height, flat_.trouble());
+    }
+    auto& list = seeds_[height];
+    list.insert(list.end(), inside.begin(), inside.end());
+    const double area = section.area;
+    sections_.emplace(height, std::move(section));
+    return area;
+  }
+
+  // Gauss–Kronrod 7, 15 [QUADPACK 1983].
+  struct Part {
+    double a, b, value, error;
+  };
+  Part Rule(double a, double b) {
+    static constexpr std::array<double, 8> kNode = {
+        0.991455371120812639206854697526329, 0.949107912342758524526189684047851,
+        0.864864423359769072789712788640926, 0.741531185599394439863864773280788,
+        0.586087235467691130294144691693555, 0.405845151377397166906606412076961,
+        0.207784955007898467600689403773245, 0.0};
+    static constexpr std::array<double, 8> kWeight = {
+        0.022935322010529224963732008058970, 0.063092092629978553290700663189204,
+        0.104790010322250183839876322541518, 0.140653259715525918745189590510238,
+        0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
+        0.204432940075298892414161999234649, 0.209482141084727828012999174891714};
+    static constexpr std::array<double, 4> kGauss = {
+        0.129484966168869693270611432679082, 0.279705391489276667901467771423780,
+        0.381830050505118944950369775488975, 0.417959183673469387755102040816327};
+    const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
+    double kronrod = 0.0, gauss = 0.0, spread = 0.0;
+    std::vector<std::pair<double, double>> values;
+    for (size_t k = 0; k < 8; ++k) {
+      for (const double sign : {-1.0, 1.0}) {
+        if (k == 7 && sign > 0.0) continue;
+        const double y = AreaAt(middle + sign * half * kNode.at(k));
+        values.emplace_back(kWeight.at(k), y);
+        kronrod += kWeight.at(k) * y;
+        if (k % 2 == 1) gauss += kGauss.at(k / 2) * y;
+      }
+    }
+    for (const auto& [weight, y] : values) spread += weight * std::abs(y - 0.5 * kronrod);
+    double error = std::abs(kronrod - gauss);
+    if (spread > 0.0) error = spread * std::min(1.0, std::pow(200.0 * error / spread, 1.5));
+    return {a, b, half * kronrod, half * error};
+  }
+
+  void Integrate(TracedSet* set) {
+    std::vector<Part> parts = {Rule(set->low, set->high)};
+    const auto sum = [&](double Part::*member) {
+      double total = 0.0;
+      for (const Part& part : parts) total += part.*member;
+      return total;
+    };
+    const double start = sum(&Part::error);
+    while (sum(&Part::error) > share_ * sum(&Part::value) &&
+           sections_.size() < kMostSections && lost_.empty()) {
+      const auto worst = std::ranges::max_element(parts, {}, &Part::error);
+      const double a = worst->a, b = worst->b, middle = 0.5 * (a + b);
+      *worst = Rule(a, middle);
+      parts.push_back(Rule(middle, b));
+      if (progress_ && start > 0.0) {
+        const double done = std::log(start / std::max(sum(&Part::error), 1e-300)) /
+                            std::log(start / (share_ * sum(&Part::value)));
+        progress_(std::clamp(done, 0.0, 1.0));
+      }
+    }
+    set->measure = sum(&Part::value);
+    set->error = sum(&Part::error);
+    double largest = 0.0;
+    for (const auto& [height, section] : sections_) largest = std::max(largest, section.error);
+    set->error += largest * (set->high - set->low);
+  }
+
+  Tracer solid_, flat_;
+  std::function<void(double)> progress_;
+  const double share_;
+  std::map<double, std::vector<SpacePose>> seeds_;
+  std::map<double, TracedSection> sections_;
+  std::string lost_;
+};
+
+TracedSet Unbounded(TracedSet set) {
+  set.summary.stop = Stop::kUnreachable;
+  set.summary.message = "the set has no end: no range, box or singularity bounds it";
+  return set;
+}
+
+TracedSet TraceLine(const PoseSpace& space, const PlacedPose& home) {
+  TracedSet set;
+  Tracer tracer(space);
+  set.inside.push_back(home.pose);
+  for (const double sign : {-1.0, 1.0}) {
+    const auto hit = tracer.Walk(home, VecX::Constant(1, sign));
+    if (tracer.unbounded()) return Unbounded(set);
+    if (!hit) {
+      set.summary.stop = Stop::kNoConvergence;
+      set.summary.message = tracer.trouble();
+      return set;
+    }
+    set.ends.emplace_back(hit->at.pose.at[0], hit->bound);
+  }
+  set.measure = set.ends[1].first - set.ends[0].first;
+  set.error = 1e-12 * space.UnitOf(0);
+  set.closings = tracer.space().closings();
+  set.summary = RunSummary::Done();
+  return set;
+}
+
+TracedSet TraceArea(const PoseSpace& space, const PlacedPose& home) {
+  TracedSet set;
+  Tracer tracer(space);
+  TracedSection section;
+  const bool found = tracer.TraceAll({home}, &section, &set.inside);
+  if (tracer.unbounded()) return Unbounded(set);
+  set.closings = tracer.space().closings();
+  if (!found) {
+    set.summary.stop = Stop::kNoConvergence;
+    set.summary.message = tracer.trouble();
+    return set;
+  }
+  set.measure = section.area;
+  set.error = section.error;
+  set.sections.push_back(std::move(section));
+  set.summary = RunSummary::Done();
+  return set;
+}
+
+}  // namespace
+
+TracedSet TraceSet(const PoseSpace& space, const PlacedPose& home,
+                   const std::function<void(double)>& progress, double share) {
+  const auto start = std::chrono::steady_clock::now();
+  TracedSet set;
+  if (space.over() == 1) {
+    set = TraceLine(space, home);
+  } else if (space.over() == 2) {
+    set = TraceArea(space, home);
+  } else {
+    SolidTracer tracer(space, home, progress, share);
+    set = tracer.Trace(home);
+    if (tracer.unbounded()) set = Unbounded(std::move(set));
+  }
+  set.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return set;
+}
+
+}  // namespace mbv

@@ -1,0 +1,55 @@
+// A set of poses by its boundary: traced bound by bound, and integrated by quadrature.
+//
+// Two dimensions: from a pose inside, straight rays end at bounds; each bound's curve
+// {margin_i = 0} is followed on the manifold of poses (so that folds, type 1, are regular curves) to
+// the corner where another margin vanishes, and on along that, until the loop closes. Each step is a
+// polynomial of degree 8 in its Chebyshev nodes, every node and corner a solution of the closure to
+// 1e-12; the area is ½ ∮ x dy − y dx [Green]. Chords from the boundary inwards look for further
+// loops: other rims, holes. Three dimensions: areas of sections, integrated by adaptive
+// Gauss–Kronrod rules between the lowest and the highest pose. One: the two ends of a path.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/run_summary.h"
+#include "features/workspace/pose_space.h"
+
+namespace mbv {
+
+/// A piece of the boundary on one bound.
+struct TracedArc {
+  int bound = -1;                      ///< of PoseSpace::bounds()
+  std::vector<Eigen::Vector2d> points;  ///< of the free coordinates [m or rad]
+};
+struct TracedLoop {
+  std::vector<TracedArc> arcs;
+  bool closed = false;
+  double area = 0.0;   ///< signed: negative around a hole
+  double error = 0.0;  ///< by the last Chebyshev coefficients
+};
+struct TracedSection {
+  double height = kNan;  ///< the third coordinate; NaN of a set in two dimensions
+  double area = 0.0, error = 0.0;
+  std::vector<TracedLoop> loops;
+};
+
+struct TracedSet {
+  RunSummary summary;
+  double measure = kNan, error = kNan;  ///< length, area or volume
+  std::vector<TracedSection> sections;  ///< by height; of one dimension none
+  std::vector<std::pair<double, int>> ends;  ///< of one dimension: coordinate, bound
+  std::vector<SpacePose> inside;             ///< some poses that belong to it
+  double low = kNan, high = kNan;            ///< of three dimensions: the third coordinate
+  long closings = 0;
+  double wall_s = 0.0;
+};
+
+/// From a home pose inside all bounds; volumes until their error is this share of them.
+[[nodiscard]] TracedSet TraceSet(const PoseSpace& space, const PlacedPose& home,
+                                 const std::function<void(double)>& progress = {},
+                                 double share = 1e-9);
+
+
+}  // namespace mbv

@@ -1,0 +1,481 @@
+// Reachable sets of any model, against areas, curves and volumes by hand and by closed forms.
+#include "features/workspace/reachable_set.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "analytic/spr_tripod/workspace.h"
+#include "features/workspace/quality.h"
+#include "features/workspace/set_report.h"
+#include "kinematics/command_rank.h"
+#include "kinematics/constraints.h"
+#include "model_file/load_model.h"
+#include "tests/support/source_dir.h"
+
+namespace mbv {
+namespace {
+
+using std::numbers::pi;
+using testing::AllOf;
+using testing::HasSubstr;
+
+Mechanism ShippedModel(const std::string& name) {
+  LoadResult result = LoadModel(SourcePath("/models/") + name + "/model.yaml");
+  EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
+  return *result.mechanism;
+}
+Mechanism FromText(const std::string& text) {
+  LoadResult result = LoadModelText(text, "set.yaml");
+  EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
+  return result.mechanism.value_or(Mechanism());
+}
+
+struct Answer {
+  std::optional<SetQuestion> question;
+  ReachableSet set;
+  Diagnostics diagnostics;
+};
+Answer Ask(const Mechanism& mechanism, const SetArguments& arguments) {
+  Answer answer;
+  answer.question = ReadQuestion(mechanism, arguments, &answer.diagnostics);
+  if (!answer.question) return answer;
+  answer.set = ComputeReachableSet(*answer.question, arguments);
+  answer.diagnostics.Append(answer.set.diagnostics);
+  return answer;
+}
+SetArguments Over(const std::vector<std::string>& over, int resolution = 60) {
+  SetArguments arguments;
+  arguments.over = over;
+  arguments.flood.resolution = resolution;
+  return arguments;
+}
+
+// Both ways have an answer, and it is this.
+void ExpectMeasure(const Answer& answer, double measure, double within) {
+  const ReachableSet& set = answer.set;
+  ASSERT_TRUE(set.summary.ok()) << answer.diagnostics.Text() << set.verdict;
+  EXPECT_TRUE(set.agree) << set.verdict;
+  EXPECT_NEAR(set.traced.measure, measure, within);
+  EXPECT_NEAR(set.flooded.measure, measure, set.flooded.error + within);
+  EXPECT_LT(set.traced.error, 1e-6 * measure);
+  EXPECT_GT(set.checked, 0u);
+  EXPECT_LT(set.checked_off, 1e-9);
+}
+
+// Two links in a plane, the second elbow up.
+std::string Arm(const std::string& more = "") {
+  return R"(
+name: arm
+parameters: {a: {value: 0.5, unit: m}, b: {value: 0.2, unit: m}}
+gravity: [0, 0, 0]
+bodies:
+  upper:
+    mass: 2
+    com: [a, 0, 0]
+    inertia: [0.01, 0.01, 0.01]
+    frames: {end: [a, 0, 0]}
+  fore:
+    mass: 3
+    com: [b, 0, 0]
+    inertia: [0.02, 0.02, 0.02]
+    frames: {end: [b, 0, 0]}
+joints:
+  shoulder: {kind: revolute, parent: world, child: upper, axis: z, guess_deg: 20}
+  elbow: {kind: revolute, parent: upper.end, child: fore, axis: z, guess_deg: 70}
+drives:
+  shoulder: {kind: joint, joint: shoulder}
+  elbow: {kind: joint, joint: elbow}
+outputs: {tip: fore.end}
+)" + more;
+}
+
+TEST(ReachableSet, AnArmsTipReachesARing) {
+  ExpectMeasure(Ask(FromText(Arm()), Over({"x", "y"})), pi * (0.49 - 0.09), 1e-10);
+}
+
+TEST(ReachableSet, AnArmsPathEndsWhereItIsStretched) {
+  const Answer answer = Ask(FromText(Arm()), Over({"x"}));
+  const double y = 0.5 * std::sin(pi / 9) + 0.2;
+  ASSERT_EQ(answer.set.traced.ends.size(), 2u) << answer.diagnostics.Text();
+  EXPECT_NEAR(answer.set.traced.ends[1].first, std::sqrt(0.49 - y * y), 1e-11);
+  EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
+}
+
+// cos θ1 cos θ2 > cos α.
+TEST(ReachableSet, AConeOfAUniversalJointIsACone) {
+  const Mechanism joint = FromText(R"(
+name: universal
+bodies:
+  rod: {mass: 1, com: [0, 0, 0.1], inertia: [0.01, 0.01, 0.01]}
+joints:
+  u: {kind: universal, parent: world, child: rod, axis: x, axis2: y}
+outputs: {rod: rod}
+)");
+  SetArguments arguments = Over({"u.0", "u.1"});
+  arguments.cones = {"u_deg=40"};
+  double area = 0.0;
+  const double alpha = 40 * pi / 180;
+  constexpr int n = 2000;  // θ1 = α sin φ: smooth to the ends
+  for (int i = 0; i < n; ++i) {
+    const double phi = pi / 2 * (i + 0.5) / n;
+    const double t1 = alpha * std::sin(phi);
+    area += 4 * std::acos(std::cos(alpha) / std::cos(t1)) * alpha * std::cos(phi) * pi / 2 / n;
+  }
+  const Answer answer = Ask(joint, arguments);
+  ExpectMeasure(answer, area, 1e-6);
+  ASSERT_FALSE(answer.set.shares.empty());
+  EXPECT_EQ(answer.set.bounds[static_cast<size_t>(answer.set.shares[0].bound)].kind,
+            SetBound::Kind::kCone);
+}
+
+// Of circles about the feet, elbows outwards; base 0.3, upper arms 0.25, forearms 0.35.
+Eigen::Vector2d Elbow(const Eigen::Vector2d& tool, double foot, double side) {
+  const Eigen::Vector2d d = tool - Eigen::Vector2d(foot, 0);
+  const double r = d.norm(), s = (0.25 * 0.25 - 0.35 * 0.35 + r * r) / (2 * r);
+  const double h = std::sqrt(std::max(0.25 * 0.25 - s * s, 0.0));
+  const Eigen::Vector2d e = d / r;
+  return Eigen::Vector2d(foot, 0) + s * e + side * h * Eigen::Vector2d(-e[1], e[0]);
+}
+
+TEST(ReachableSet, AFiveBarsCirclesAndSingularCurvesAreThoseOfItsClosedForm) {
+  const Mechanism five_bar = ShippedModel("rubbing_five_bar");
+  SetArguments arguments = Over({"x", "y"}, 120);
+  // Beyond type 2: the lens of two circles less the two inner ones.
+  arguments.cross_singularities = true;
+  const double lens = 2 * 0.36 * std::acos(0.25) - 0.15 * std::sqrt(4 * 0.36 - 0.09);
+  const Answer whole = Ask(five_bar, arguments);
+  ExpectMeasure(whole, lens - 2 * pi * 0.01, 1e-10);
+  EXPECT_EQ(whole.set.traced.sections[0].loops.size(), 3u);
+
+  arguments.cross_singularities = false;
+  const Answer answer = Ask(five_bar, arguments);
+  ASSERT_TRUE(answer.set.agree) << answer.set.verdict;
+  size_t type1 = 0, type2 = 0;
+  for (const TracedLoop& loop : answer.set.traced.sections[0].loops) {
+    for (const TracedArc& arc : loop.arcs) {
+      for (const Eigen::Vector2d& p : arc.points) {
+        const double r1 = p.norm(), r2 = (p - Eigen::Vector2d(0.3, 0)).norm();
+        const SetBound::Kind kind = answer.set.bounds[static_cast<size_t>(arc.bound)].kind;
+        if (kind == SetBound::Kind::kType1) {
+          // Stretched or folded.
+          const double off = std::min({std::abs(r1 - 0.6), std::abs(r1 - 0.1),
+                                       std::abs(r2 - 0.6), std::abs(r2 - 0.1)});
+          EXPECT_LT(off, 1e-9) << p.transpose();
+          ++type1;
+        } else if (r1 < 0.599 && r2 < 0.599) {
+          // The forearms lie in one line.
+          const Eigen::Vector2d a = p - Elbow(p, 0, 1), b = p - Elbow(p, 0.3, -1);
+          EXPECT_LT(std::abs(a[0] * b[1] - a[1] * b[0]) / (0.35 * 0.35), 1e-9) << p.transpose();
+          ++type2;
+        }
+      }
+    }
+  }
+  EXPECT_GT(type1, 50u);
+  EXPECT_GT(type2, 20u);
+}
+
+// Three arms of two links hold a platform; home is turned so that nothing is symmetric.
+constexpr const char* k3Rrr = R"(
+name: planar_3rrr
+parameters: {l: {value: 0.25, unit: m}, R: {value: 0.35, unit: m}, r: {value: 0.12, unit: m}}
+gravity: [0, 0, 0]
+bodies:
+  platform: {mass: 1, inertia: [0.01, 0.01, 0.01]}
+parts:
+  arm:
+    parameters: {phi: 0}
+    attach:
+      world: {A: {position: [R*cos(phi), R*sin(phi), 0]}}
+      platform: {C: {position: [r*cos(phi), r*sin(phi), 0]}}
+    bodies:
+      upper: {mass: 0.2, inertia: [0.001, 0.001, 0.001], frames: {end: [l, 0, 0]}}
+      fore: {mass: 0.2, inertia: [0.001, 0.001, 0.001], frames: {end: [l, 0, 0]}}
+    joints:
+      A: {kind: revolute, parent: world.A, child: upper, axis: z, guess: phi + 2.2}
+      B: {kind: revolute, parent: upper.end, child: fore, axis: z, guess: 1.6}
+      C: {kind: revolute, parent: platform.C, child: fore.end, axis: z, closure: true}
+    drives:
+      drive: {kind: joint, joint: A}
+instances:
+  a: {part: arm, phi: 0.2}
+  b: {part: arm, phi: 2.3}
+  c: {part: arm, phi: 4.3}
+joints:
+  base: {kind: planar, parent: world, child: platform, axis: z, guess: [0.01, 0.02, 0.1], closure: false}
+outputs: {platform: platform}
+)";
+
+TEST(ReachableSet, SingularCurvesOfA3RrrAreThoseOfItsClosedForm) {
+  const Mechanism robot = FromText(k3Rrr);
+  SetArguments arguments = Over({"x", "y"}, 80);
+  arguments.at = {"yaw=0.1"};
+  const Answer answer = Ask(robot, arguments);
+  ASSERT_TRUE(answer.set.summary.ok()) << answer.diagnostics.Text() << answer.set.verdict;
+  EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
+  // Working modes as at home.
+  const std::array<double, 3> phi = {0.2, 2.3, 4.3};
+  const auto elbow = [&](const Eigen::Vector2d& p, size_t i, double side) {
+    const double yaw = 0.1;
+    const Eigen::Vector2d A(0.35 * std::cos(phi.at(i)), 0.35 * std::sin(phi.at(i)));
+    const Eigen::Vector2d C =
+        p + 0.12 * Eigen::Vector2d(std::cos(phi.at(i) + yaw), std::sin(phi.at(i) + yaw));
+    const Eigen::Vector2d d = C - A;
+    const double h = std::sqrt(std::max(0.0625 - 0.25 * d.squaredNorm(), 0.0));
+    return std::pair(C, Eigen::Vector2d(A + 0.5 * d + side * h * Eigen::Vector2d(-d[1], d[0]).normalized()));
+  };
+  std::array<double, 3> side{};
+  for (size_t i = 0; i < 3; ++i) {
+    const Pose& X_WB = robot.X_WB_home[static_cast<size_t>(
+        robot.FindBody(std::string(1, "abc"[i]) + ".fore"))];
+    const Pose& X_WP = robot.X_WB_home[static_cast<size_t>(robot.FindBody("platform"))];
+    // At home's own yaw the sign is the same.
+    const Eigen::Vector2d A(0.35 * std::cos(phi.at(i)), 0.35 * std::sin(phi.at(i)));
+    const Vec3 C = X_WP * Vec3(0.12 * std::cos(phi.at(i)), 0.12 * std::sin(phi.at(i)), 0);
+    const Eigen::Vector2d d = C.head<2>() - A, b = X_WB.translation().head<2>() - A;
+    side.at(i) = d[0] * b[1] - d[1] * b[0] > 0 ? 1.0 : -1.0;
+  }
+  size_t type1 = 0, type2 = 0;
+  for (const TracedLoop& loop : answer.set.traced.sections[0].loops) {
+    for (const TracedArc& arc : loop.arcs) {
+      const SetBound::Kind kind = answer.set.bounds[static_cast<size_t>(arc.bound)].kind;
+      for (const Eigen::Vector2d& p : arc.points) {
+        Mat3 lines;
+        double stretched = 1.0;
+        for (size_t i = 0; i < 3; ++i) {
+          const auto [C, B] = elbow(p, i, side.at(i));
+          const Eigen::Vector2d u = (C - B).normalized(), c = C - p;
+          lines.row(static_cast<Eigen::Index>(i)) << u[0], u[1], (c[0] * u[1] - c[1] * u[0]) / 0.12;
+          const Eigen::Vector2d A(0.35 * std::cos(phi.at(i)), 0.35 * std::sin(phi.at(i)));
+          stretched = std::min(stretched, std::abs((C - A).norm() - 0.5));
+        }
+        if (kind == SetBound::Kind::kType1) {
+          EXPECT_LT(stretched, 1e-9);
+          ++type1;
+        } else if (kind == SetBound::Kind::kType2 && stretched > 1e-3) {
+          EXPECT_LT(std::abs(lines.determinant()), 1e-9);
+          ++type2;
+        }
+      }
+    }
+  }
+  EXPECT_GT(type1 + type2, 50u);
+  EXPECT_GT(type2, 8u);
+}
+
+spr_tripod::Geometry TripodGeometry(const Mechanism& tripod) {
+  Diagnostics diagnostics;
+  spr_tripod::Geometry geometry = spr_tripod::ReadGeometry(tripod, &diagnostics);
+  EXPECT_FALSE(diagnostics.has_errors()) << diagnostics.Text();
+  return geometry;
+}
+
+// A section of the tripod, whose closed form knows its rim.
+double TripodSection(const Mechanism& tripod, double z) {
+  const spr_tripod::Geometry geometry = TripodGeometry(tripod);
+  // Corners lie where two legs are at their ends; their azimuths are found by the second
+  // differences, so the integral is by many azimuths instead and Richardson.
+  const auto area = [&](int n) {
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i) {
+      const double rho = spr_tripod::ReachAt(geometry, z, 2 * pi * (i + 0.5) / n);
+      sum += pi / n * rho * rho;
+    }
+    return sum;
+  };
+  return area(24000);
+}
+
+TEST(ReachableSet, ASectionOfTheTripodIsThatOfItsClosedForm) {
+  const Mechanism tripod = ShippedModel("spr_tripod");
+  SetArguments arguments = Over({"x", "y"}, 120);
+  arguments.at = {"z=0.6"};
+  const Answer answer = Ask(tripod, arguments);
+  ExpectMeasure(answer, TripodSection(tripod, 0.6), 2e-8);
+  EXPECT_LT(answer.set.traced.error, 1e-9);
+  // Strokes that are longer by 1e-4 m show.
+  Mechanism longer = tripod;
+  for (Drive& drive : longer.drives) drive.range.upper += 1e-4;
+  for (Joint& joint : longer.joints) {
+    if (joint.kind == JointKind::kPrismatic) joint.range[0].upper += 1e-4;
+  }
+  const Answer other = Ask(longer, arguments);
+  EXPECT_GT(other.set.traced.measure - answer.set.traced.measure,
+            100 * (answer.set.traced.error + other.set.traced.error));
+  EXPECT_NEAR(other.set.traced.measure, TripodSection(longer, 0.6), 1.0);
+}
+
+TEST(ReachableSet, TheTripodsVolumeIsThatOfItsClosedForm) {
+  const Mechanism tripod = ShippedModel("spr_tripod");
+  Diagnostics diagnostics;
+  const auto question = ReadQuestion(tripod, Over({"x", "y", "z"}), &diagnostics);
+  ASSERT_TRUE(question.has_value()) << diagnostics.Text();
+  PoseSpace space(question->mechanism, question->settings);
+  PlacedPose home;
+  ASSERT_TRUE(space.Home(&home));
+  space.CountFrom(&home);
+  const TracedSet set = TraceSet(space, home, {}, 1e-6);
+  ASSERT_TRUE(set.summary.ok()) << set.summary.message;
+  EXPECT_NEAR(set.measure, 0.01243676143457, 1e-6 * 0.0124);
+  EXPECT_NEAR(set.low, 0.435861216, 1e-6);
+  EXPECT_NEAR(set.high, 0.708854710, 1e-6);
+}
+
+// A flood that takes one stroke to be longer disagrees with the boundary.
+TEST(ReachableSet, AFloodWithAWrongBoundDisagrees) {
+  const Mechanism tripod = ShippedModel("spr_tripod");
+  SetArguments arguments = Over({"x", "y"}, 120);
+  arguments.at = {"z=0.6"};
+  Answer answer = Ask(tripod, arguments);
+  ASSERT_TRUE(answer.set.agree) << answer.set.verdict;
+  SetArguments wrong = arguments;
+  wrong.ranges = {"leg1=0.5:0.752"};
+  const Answer other = Ask(tripod, wrong);
+  answer.set.flooded = other.set.flooded;
+  JudgeSet(&answer.set);
+  EXPECT_FALSE(answer.set.agree) << answer.set.verdict;
+}
+
+TEST(ReachableSet, ItsNumbersDoNotDependOnTheNumberOfThreads) {
+  const Mechanism five_bar = ShippedModel("rubbing_five_bar");
+  SetArguments arguments = Over({"x", "y"}, 40);
+  const Answer one = Ask(five_bar, arguments);
+  arguments.flood.threads = 3;
+  const Answer many = Ask(five_bar, arguments);
+  EXPECT_EQ(one.set.traced.measure, many.set.traced.measure);
+  EXPECT_EQ(one.set.flooded.measure, many.set.flooded.measure);
+  EXPECT_EQ(one.set.flooded.closings, many.set.flooded.closings);
+}
+
+// Coarse, over two coordinates at most; drives without ranges get some.
+TEST(ReachableSet, EveryShippedModelHasOne) {
+  size_t models = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
+    const Mechanism model = ShippedModel(entry.path().filename().string());
+    if (model.outputs.empty()) continue;
+    ++models;
+    SetArguments arguments = Over({}, 24);
+    for (const Drive& drive : model.drives) {
+      if (std::isfinite(drive.range.lower) || std::isfinite(drive.range.upper)) continue;
+      const double home = HomeValue(
+          model, {Coordinate::Kind::kDrive, static_cast<int>(&drive - model.drives.data()), 0});
+      const bool slides = PositionUnit(model, drive) == "m";
+      arguments.ranges.push_back(fmt::format("{}={:.17g}:{:.17g}", drive.name,
+                                             slides ? 0.8 * home - 0.05 : home - 0.6,
+                                             slides ? 1.2 * home + 0.05 : home + 0.6));
+    }
+    Diagnostics diagnostics;
+    auto question = ReadQuestion(model, arguments, &diagnostics);
+    ASSERT_TRUE(question.has_value()) << model.name << ": " << diagnostics.Text();
+    if (question->settings.over == 3) {
+      arguments.over = {"x", "y"};
+      question = ReadQuestion(model, arguments, &diagnostics);
+      ASSERT_TRUE(question.has_value()) << model.name << ": " << diagnostics.Text();
+    }
+    const ReachableSet set = ComputeReachableSet(*question, arguments);
+    EXPECT_FALSE(set.diagnostics.has_errors()) << model.name << ": " << set.diagnostics.Text();
+    EXPECT_TRUE(set.agree) << model.name << ": " << set.verdict;
+    EXPECT_GT(set.traced.measure, 0.0) << model.name;
+  }
+  EXPECT_GT(models, 15u);
+}
+
+std::string Refusal(const Mechanism& mechanism, const SetArguments& arguments) {
+  const Answer answer = Ask(mechanism, arguments);
+  return answer.diagnostics.Text() + (answer.set.summary.ok() ? "" : answer.set.verdict);
+}
+
+TEST(ReachableSet, WhatCannotBeAnsweredIsRefusedWithAReason) {
+  const Mechanism tripod = ShippedModel("spr_tripod");
+  SetArguments arguments = Over({"x", "yy"});
+  arguments.at = {"z_deg=4", "z"};
+  arguments.cones = {"leg9=1"};
+  EXPECT_THAT(Refusal(tripod, arguments),
+              AllOf(HasSubstr("there is no coordinate 'yy'"), HasSubstr("the coordinate is in m"),
+                    HasSubstr("a value is needed"), HasSubstr("there is no joint 'leg9'")));
+  EXPECT_THAT(Refusal(tripod, Over({"x", "y", "z", "roll"})), HasSubstr("one to three"));
+  EXPECT_THAT(Refusal(tripod, Over({"x", "y", "yaw"})), HasSubstr("'platform.yaw'"));
+  EXPECT_THAT(Refusal(tripod, Over({"x=2:3", "y"})), HasSubstr("cannot be reached from home"));
+  EXPECT_THAT(Refusal(tripod, Over({"x=3:2", "y"})), HasSubstr("LOW is not below HIGH"));
+  EXPECT_THAT(Refusal(tripod, Over({"x", "y", "z"}, 4000)), HasSubstr("takes about"));
+  arguments = Over({"x", "y"});
+  arguments.at = {"z=0.7088"};
+  arguments.from = {"x=0.1"};
+  EXPECT_THAT(Refusal(tripod, arguments), HasSubstr("beyond leg"));
+  Mechanism none = tripod;
+  none.outputs.clear();
+  EXPECT_THAT(Refusal(none, Over({})), HasSubstr("no output"));
+  EXPECT_THAT(Refusal(FromText(R"(
+name: slide
+bodies: {cart: {mass: 1, inertia: [1, 1, 1]}}
+joints: {rail: {kind: prismatic, parent: world, child: cart, axis: x}}
+drives: {rail: {kind: joint, joint: rail}}
+outputs: {cart: cart}
+)"),
+                      Over({"x"})),
+              HasSubstr("has no end"));
+}
+
+// Of an arm all is known: K = J, M, gravity.
+TEST(Quality, AnArmsIndicesAreThoseByHand) {
+  const Mechanism arm = FromText(Arm(R"(
+motors:
+  shoulder: {continuous: 40, max_speed: 3}
+  elbow: {continuous: 10, max_speed: 5}
+)"));
+  Mechanism heavy = arm;
+  heavy.gravity_W = Vec3(0, -9.81, 0);
+  SetArguments arguments = Over({"x", "y"}, 60);
+  const Answer answer = Ask(heavy, arguments);
+  ASSERT_TRUE(answer.set.agree) << answer.set.verdict;
+  const QualityMap map = MapQuality(*answer.question, answer.set, "tip", 1);
+  ASSERT_EQ(map.why_none, "");
+  ASSERT_GT(map.points.size(), 100u);
+  const auto index = [&](const std::string& name) {
+    for (size_t i = 0; i < map.indices.size(); ++i) {
+      if (map.indices[i].name == name) return static_cast<Eigen::Index>(i);
+    }
+    ADD_FAILURE() << name;
+    return Eigen::Index{0};
+  };
+  const double a = 0.5, b = 0.2;
+  for (size_t k = 0; k < map.points.size(); k += 7) {
+    const Vec3& p = answer.set.flooded.lattice[map.points[k]].at;
+    const double c2 = (p.squaredNorm() - a * a - b * b) / (2 * a * b), s2 = std::sqrt(1 - c2 * c2);
+    const double q1 = std::atan2(p[1], p[0]) - std::atan2(b * s2, a + b * c2);
+    Eigen::Matrix2d J;
+    J << -p[1], -b * std::sin(q1 + std::acos(c2)), p[0], b * std::cos(q1 + std::acos(c2));
+    const auto expect = [&](const std::string& name, double value) {
+      EXPECT_NEAR(map.values[k][index(name)], value, 1e-8 * (1 + std::abs(value))) << name;
+    };
+    const Eigen::Matrix2d V = J * Eigen::Vector2d(3, 5).asDiagonal();
+    expect("speed_most", std::max((V.col(0) + V.col(1)).norm(), (V.col(0) - V.col(1)).norm()));
+    const double det = std::abs(V.determinant());
+    expect("speed_least", det / std::max(V.col(0).norm(), V.col(1).norm()));
+    const Eigen::Matrix2d F = (J.transpose().inverse()) * Eigen::Vector2d(40, 10).asDiagonal();
+    expect("force_most", std::max((F.col(0) + F.col(1)).norm(), (F.col(0) - F.col(1)).norm()));
+    expect("force_least",
+           std::abs(F.determinant()) / std::max(F.col(0).norm(), F.col(1).norm()));
+    // Masses in the links' ends.
+    expect("mass_elbow", 0.02 + 3 * b * b);
+    expect("mass_shoulder", 0.01 + 2 * a * a + 0.02 + 3 * p.head<2>().squaredNorm());
+    const double held2 = 3 * 9.81 * b * std::cos(q1 + std::acos(c2));
+    const double held1 = 2 * 9.81 * a * std::cos(q1) + 3 * 9.81 * p[0];
+    const double g1 = 9.81 * p[0], g2 = 9.81 * b * std::cos(q1 + std::acos(c2));
+    double payload = std::min(((g1 > 0 ? 40 - held1 : 40 + held1) / std::abs(g1)),
+                              ((g2 > 0 ? 10 - held2 : 10 + held2) / std::abs(g2)));
+    if (std::abs(held1) > 40 || std::abs(held2) > 10) payload = 0.0;
+    expect("payload", payload);
+    // Perturbed by a thousandth, it would show.
+    EXPECT_GT(std::abs(1.001 * map.values[k][index("mass_elbow")] - (0.02 + 3 * b * b)), 1e-5);
+  }
+}
+
+}  // namespace
+}  // namespace mbv
