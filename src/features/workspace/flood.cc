@@ -23,6 +23,8 @@ using Lattice = std::array<int, 3>;
 constexpr double kSame = 1e-6;          // two poses of a corner [rad, characteristic lengths]
 constexpr double kCutShare = 1e-4;      // of an edge, to which a cut is found
 constexpr int kMostCuts = 30;
+constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]; of a plan
+constexpr int kMostStrides = 10000;
 constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
 constexpr double kMostCorners = 4e6;
 constexpr std::array<int, 4> kUsualResolution = {0, 400, 240, 64};
@@ -65,11 +67,14 @@ struct Simplex {
 class Flooder {
  public:
   Flooder(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
-          const std::function<void(double)>& progress)
-      : space_(space), home_(home), settings_(settings), progress_(progress), k_(space.over()) {}
+          const FloodPlan& plan, const std::function<void(double)>& progress)
+      : space_(space), home_(home), settings_(settings), progress_(progress), k_(space.over()) {
+    set_.step = plan.step;
+    set_.summary = plan.summary;
+  }
 
   FloodedSet Flood() {
-    if (!ChooseStep()) return std::move(set_);
+    if (!set_.summary.ok()) return std::move(set_);
     FloodCoarse();
     if (!set_.summary.ok()) return std::move(set_);
     for (int level = 0; level <= settings_.halvings; ++level) {
@@ -82,7 +87,8 @@ class Flooder {
     const auto count = set_.levels.size();
     set_.measure = set_.levels.back();
     // Of second order, but for corners: where several bounds cut a cell, half of it is open.
-    set_.error = std::abs(set_.levels[count - 1] - set_.levels[count - 2]) + 0.5 * CornerCells();
+    set_.error = std::abs(set_.levels[count - 1] - set_.levels[count - 2]) + 0.5 * CornerCells() +
+                 kCutShare * SizeOfCells(CutCells(settings_.halvings).size());
     set_.corners = static_cast<long>(corners_.size());
     for (const auto& [key, corner] : corners_) set_.inside += corner.inside;
     set_.closings = closings_;
@@ -103,55 +109,6 @@ class Flooder {
     return p;
   }
 
-  // By how far the set reaches along the coordinates from home; the flood may go farther.
-  bool ChooseStep() {
-    const auto start = std::chrono::steady_clock::now();
-    const int resolution = settings_.resolution > 0
-                               ? settings_.resolution
-                               : kUsualResolution.at(static_cast<size_t>(k_));
-    double cells = 1.0;
-    long poses = 0;
-    for (int c = 0; c < k_; ++c) {
-      double reach = 0.0;
-      for (const double sign : {-1.0, 1.0}) {
-        PlacedPose at = home_;
-        const double step = 0.02 * space_.UnitOf(c);
-        int count = 0;
-        for (; count < 10000; ++count, ++poses) {
-          VecX target = at.pose.at;
-          target[c] += sign * step;
-          PlacedPose next;
-          if (!space_.Close(at, target, &next) || next.pose.margin.minCoeff() < 0.0) break;
-          at = std::move(next);
-        }
-        if (count == 10000) {
-          set_.summary.stop = Stop::kUnreachable;
-          set_.summary.message = "the set has no end: no range, box or singularity bounds " +
-                                 space_.settings().coordinates[static_cast<size_t>(c)].name;
-          return false;
-        }
-        reach += step * (count + 0.5);
-      }
-      set_.step.at(static_cast<size_t>(c)) = 1.15 * reach / resolution;
-      cells *= 1.15 * resolution;
-    }
-    const double each =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() /
-        static_cast<double>(std::max(poses, 1L));
-    // Coarse cells everywhere, fine ones and their cuts on the boundary.
-    const double boundary = k_ * 2.0 * std::pow(static_cast<double>(resolution), k_ - 1) * 6.0;
-    const double corners = cells / std::pow(SpacingAt(0), k_) + boundary;
-    set_.estimate_s = each * (corners + 3.0 * boundary) / settings_.threads;
-    if (set_.estimate_s > settings_.most_s || corners > kMostCorners) {
-      set_.summary.stop = Stop::kUnsupported;
-      set_.summary.message =
-          fmt::format("--resolution {} takes about {} ({:.2g} poses)", resolution,
-                      TimeText(set_.estimate_s), corners + 3.0 * boundary);
-      return false;
-    }
-    return true;
-  }
-
   void Take(const Lattice& key, Corner corner) {
     Corner& known = corners_[key];
     if (!known.closes || !corner.closes) {
@@ -163,6 +120,8 @@ class Flooder {
   }
   [[nodiscard]] bool Differ(const SpacePose& a, const SpacePose& b) const {
     for (size_t j = 0; j < a.X_FM.size(); ++j) {
+      // Idle spins of rods depend on the way.
+      if (space_.has_idle_spins() && HasBall(space_.mechanism().joints[j].kind)) continue;
       const double turn = (a.X_FM[j].linear() - b.X_FM[j].linear()).cwiseAbs().maxCoeff();
       const double slide =
           (a.X_FM[j].translation() - b.X_FM[j].translation()).norm() / space_.length();
@@ -631,10 +590,15 @@ class Flooder {
     return sum;
   }
 
+  [[nodiscard]] double SizeOfCells(size_t count) const {
+    auto size = static_cast<double>(count);
+    for (int c = 0; c < k_; ++c) size *= set_.step.at(static_cast<size_t>(c));
+    return size;
+  }
   // Size of the finest cells that several bounds cut.
   [[nodiscard]] double CornerCells() const {
     if (k_ == 1) return 0.0;
-    double size = 0.0;
+    size_t cells = 0;
     for (const Lattice& cell : CutCells(settings_.halvings)) {
       int bound = -2;
       bool several = false;
@@ -649,10 +613,9 @@ class Flooder {
           }
         }
       });
-      if (several) size += 1.0;
+      cells += several;
     }
-    for (int c = 0; c < k_; ++c) size *= set_.step.at(static_cast<size_t>(c));
-    return size;
+    return SizeOfCells(cells);
   }
 
   void KeepLattice() {
@@ -687,10 +650,61 @@ class Flooder {
 
 }  // namespace
 
-FloodedSet FloodSet(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
-                    const std::function<void(double)>& progress) {
+FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home,
+                    const FloodSettings& settings) {
+  FloodPlan plan;
   const auto start = std::chrono::steady_clock::now();
-  FloodedSet set = Flooder(space, home, settings, progress).Flood();
+  const int k = space.over();
+  const int resolution = settings.resolution > 0 ? settings.resolution
+                                                 : kUsualResolution.at(static_cast<size_t>(k));
+  double cells = 1.0;
+  long poses = 0;
+  for (int c = 0; c < k; ++c) {
+    double reach = 0.0;
+    for (const double sign : {-1.0, 1.0}) {
+      PlacedPose at = home;
+      const double step = kStride * space.UnitOf(c);
+      int count = 0;
+      for (; count < kMostStrides; ++count, ++poses) {
+        VecX target = at.pose.at;
+        target[c] += sign * step;
+        PlacedPose next;
+        if (!space.Close(at, target, &next) || next.pose.margin.minCoeff() < 0.0) break;
+        at = std::move(next);
+      }
+      if (count == kMostStrides) {
+        plan.summary.stop = Stop::kUnreachable;
+        plan.summary.message = "the set has no end: no range, box or singularity bounds " +
+                               space.settings().coordinates[static_cast<size_t>(c)].name;
+        return plan;
+      }
+      reach += step * (count + 0.5);
+    }
+    plan.step.at(static_cast<size_t>(c)) = kRoom * reach / resolution;
+    cells *= kRoom * resolution;
+  }
+  const double each =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() /
+      static_cast<double>(std::max(poses, 1L));
+  // Coarse cells everywhere, fine ones and their cuts on the boundary.
+  const double boundary = 12.0 * k * std::pow(static_cast<double>(resolution), k - 1);
+  const double corners = cells / std::exp2(settings.halvings * k) + boundary;
+  plan.estimate_s = each * (corners + 3.0 * boundary) / settings.threads;
+  if (plan.estimate_s > settings.most_s || corners > kMostCorners) {
+    plan.summary.stop = Stop::kUnsupported;
+    plan.summary.message =
+        fmt::format("--resolution {} takes about {} ({:.2g} poses); state a lower one", resolution,
+                    TimeText(plan.estimate_s), corners + 3.0 * boundary);
+    return plan;
+  }
+  plan.summary = RunSummary::Done();
+  return plan;
+}
+
+FloodedSet FloodSet(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
+                    const FloodPlan& plan, const std::function<void(double)>& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  FloodedSet set = Flooder(space, home, settings, plan, progress).Flood();
   set.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return set;
 }

@@ -50,12 +50,21 @@ struct FloodedSet {
   std::vector<FloodPoint> lattice;  ///< coarsest corners, the first coordinate fastest
   std::array<double, 3> lattice_step{};
   long corners = 0, inside = 0, closings = 0, conflicts = 0;
-  double estimate_s = kNan;  ///< before it began
   double wall_s = 0.0;
 };
 
+/// The spacing by how far the set reaches along the coordinates from home, and how long it takes;
+/// kUnsupported where that is too long, kUnreachable without an end.
+struct FloodPlan {
+  RunSummary summary;
+  std::array<double, 3> step{};
+  double estimate_s = kNan;
+};
+[[nodiscard]] FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home,
+                                  const FloodSettings& settings);
+
 [[nodiscard]] FloodedSet FloodSet(const PoseSpace& space, const PlacedPose& home,
-                                  const FloodSettings& settings,
+                                  const FloodSettings& settings, const FloodPlan& plan,
                                   const std::function<void(double)>& progress = {});
 
 }  // namespace mbv

@@ -19,6 +19,7 @@ namespace {
 constexpr double kRank = 1e-9;        // pivots of A below this share of the first are zero
 constexpr double kWeakest = 1e-6;     // at this share of what it is at home a constraint is lost
 constexpr double kClosed = 1e-11;     // a last step [rad, characteristic lengths]
+constexpr double kOpen = 1e-9;        // of rows that were redundant at home [rad, characteristic lengths]
 constexpr double kLongStep = 0.3;     // longer ones are cut [rad, characteristic lengths]
 constexpr double kTrusted = 0.5;      // a correction beyond this share of the step is not
 constexpr double kOverlap = 0.3;      // of the motions before and behind a step: det N₁ᵀ N₂
@@ -73,9 +74,9 @@ PoseSpace::PoseSpace(const Mechanism& mechanism, SpaceSettings settings)
 
 PoseSpace PoseSpace::Section(int over) const {
   PoseSpace section = *this;
-  const int more = settings_.over - over;
-  VecX held(settings_.held.size() + more);
-  held << VecX::Zero(more), settings_.held;
+  VecX held = VecX::Zero(static_cast<Eigen::Index>(settings_.coordinates.size()) - over);
+  const Eigen::Index same = std::min(held.size(), settings_.held.size());
+  held.tail(same) = settings_.held.tail(same);
   section.settings_.held = held;
   section.settings_.over = over;
   return section;
@@ -117,7 +118,7 @@ void PoseSpace::AddRange(const Coordinate& coordinate, SetBound::Kind kind,
         {kind,
          length ? fmt::format("{} at {:.6g} m", subject, limit)
                 : fmt::format("{} at {:.6g}°", subject, limit * 180.0 / std::numbers::pi),
-         subject, upper, limit, watched});
+         subject, upper, limit, watched, length ? "m" : "rad"});
   }
 }
 
@@ -138,7 +139,7 @@ void PoseSpace::AddBounds() {
     bounds_.push_back({SetBound::Kind::kCone,
                        fmt::format("cone of {} at {:.6g}°", joint,
                                    cone.angle * 180.0 / std::numbers::pi),
-                       joint, true, cone.angle, static_cast<int>(c)});
+                       joint, true, cone.angle, static_cast<int>(c), "rad"});
   }
   for (size_t k = 0; k < settings_.box.size(); ++k) {
     for (const bool upper : {false, true}) {
@@ -146,7 +147,8 @@ void PoseSpace::AddBounds() {
       if (!std::isfinite(limit)) continue;
       const std::string& name = settings_.coordinates[k].name;
       bounds_.push_back({SetBound::Kind::kBox, fmt::format("box {} = {:.6g}", name, limit), name,
-                         upper, limit, static_cast<int>(k)});
+                         upper, limit, static_cast<int>(k),
+                         UnitOf(static_cast<int>(k)) == length_ ? "m" : "rad"});
     }
   }
   bounds_.push_back({SetBound::Kind::kConstraint, "constraint singularity", "", false, 0.0, -1});
@@ -280,7 +282,8 @@ bool PoseSpace::Correct(const PlacedPose& from, const VecX& target, double most,
     if (size < kClosed) {
       Evaluate(&to->pose, &rows);
       // Rows that were redundant may open elsewhere.
-      if (!Factor(&rows) || rows.r.cwiseAbs().maxCoeff() > 1e-9) return false;
+      const double open = rows.r.size() > 0 ? rows.r.cwiseAbs().maxCoeff() : 0.0;
+      if (!Factor(&rows) || open > kOpen) return false;
       return Finish(from.N, &rows, to);
     }
   }
@@ -477,6 +480,11 @@ VecX PoseSpace::Slope(const PlacedPose& at, int bound) const {
     slope[k] = (beyond.pose.margin[bound] - before.pose.margin[bound]) / (2 * kSlopeStep);
   }
   return slope;
+}
+
+MatX PoseSpace::Twists(const PlacedPose& at, const BodyStates& states) const {
+  const MatX J = tree_.Jacobian(states);
+  return J.bottomRows(J.rows() - 6) * (unit_.asDiagonal() * at.N);
 }
 
 BodyStates PoseSpace::States(const SpacePose& pose) const {

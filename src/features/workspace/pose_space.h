@@ -32,7 +32,8 @@ struct SetBound {
   std::string subject;  ///< of drive, joint or coordinate; "" of singularities
   bool upper = false;
   double limit = 0.0;  ///< [m or rad]
-  int watched = -1;    ///< of PoseSpace::Watched(), of kBox a coordinate of the set
+  int watched = -1;  ///< of SpacePose::watched, of kBox a coordinate, of kCone one of the cones
+  std::string unit = "1";  ///< of its margin: "m", "rad", "1"
 };
 [[nodiscard]] const char* WordOf(SetBound::Kind kind);
 [[nodiscard]] inline bool IsSingularity(SetBound::Kind kind) {
@@ -82,7 +83,7 @@ class PoseSpace {
   /// The mechanism outlives it.
   PoseSpace(const Mechanism& mechanism, SpaceSettings settings);
 
-  /// The same with less coordinates free, the last of them held.
+  /// The same with only the first `over` coordinates free, more or less than here.
   [[nodiscard]] PoseSpace Section(int over) const;
   /// Another value of a held coordinate (index as in `coordinates`).
   void Hold(int coordinate, double value) { settings_.held[coordinate - settings_.over] = value; }
@@ -92,6 +93,7 @@ class PoseSpace {
   [[nodiscard]] const std::vector<SetBound>& bounds() const { return bounds_; }
   [[nodiscard]] const Mechanism& mechanism() const { return *mechanism_; }
   [[nodiscard]] double length() const { return length_; }
+  [[nodiscard]] bool has_idle_spins() const { return !spins_.empty(); }
   /// A length that a free coordinate's unit counts as: the characteristic one, or 1 rad.
   [[nodiscard]] double UnitOf(int coordinate) const;
   /// Searches for a pose so far, by this object.
@@ -118,6 +120,8 @@ class PoseSpace {
 
   /// Slope of a bound's margin along N_free.
   [[nodiscard]] VecX Slope(const PlacedPose& at, int bound) const;
+  /// Twists [ω; v of Bo] of the moving bodies per unit of N: 6·(bodies − 1) × d.
+  [[nodiscard]] MatX Twists(const PlacedPose& at, const BodyStates& states) const;
   /// Where all bodies are.
   [[nodiscard]] BodyStates States(const SpacePose& pose) const;
 

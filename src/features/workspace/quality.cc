@@ -13,8 +13,7 @@
 #include <thread>
 
 #include "kinematics/constraints.h"
-#include "mechanism/reach.h"
-#include "reference/reduced_model.h"
+#include "reference/force_solver.h"
 
 namespace mbv {
 namespace {
@@ -22,7 +21,6 @@ namespace {
 constexpr double kRankShare = 1e-9;      // smaller singular values are none
 constexpr double kSingularShare = 1e-12; // of D: no (1)
 constexpr double kStiffnessStep = 1e-5;  // [rad, characteristic lengths]
-constexpr size_t kBlock = 64;            // poses that one search goes through
 constexpr Eigen::Index kMostDrives = 12; // of corners
 
 // Reach of {K ṁ : |ṁ_i| ≤ 1} within the space that K spans: least and largest.
@@ -114,48 +112,40 @@ Limits LimitsOf(const Mechanism& m) {
 
 class QualityMapper {
  public:
-  QualityMapper(const SetQuestion& question, const ReachableSet& set, const std::string& output)
-      : mechanism_(question.mechanism),
-        settings_(question.settings),
-        set_(set),
-        length_(CharacteristicLength(mechanism_)),
+  /// All coordinates of `space` are free.
+  QualityMapper(const PoseSpace& space, const std::string& output)
+      : space_(space),
+        mechanism_(space.mechanism()),
+        length_(space.length()),
         limits_(LimitsOf(mechanism_)),
         output_(mechanism_.outputs[static_cast<size_t>(mechanism_.FindOutput(output))]) {
-    for (size_t k = 0; k < settings_.coordinates.size(); ++k) {
-      coordinates_.push_back(settings_.coordinates[k].coordinate);
-      if (coordinates_.back().kind != Coordinate::Kind::kPrescribed) {
-        moving_.push_back(static_cast<Eigen::Index>(k));
-      }
-    }
-    for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
-      servos_ = servos_ && std::isfinite(mechanism_.drives[d].stiffness);
-      drive_unit_.push_back(PositionUnit(mechanism_, mechanism_.drives[d]) == "m" ? 1.0 : length_);
+    for (const Drive& drive : mechanism_.drives) {
+      servos_ = servos_ && std::isfinite(drive.stiffness);
+      drive_unit_.push_back(PositionUnit(mechanism_, drive) == "m" ? 1.0 : length_);
     }
     servos_ = servos_ && !mechanism_.drives.empty();
+    dofs_ = static_cast<Eigen::Index>(space.settings().coordinates.size() -
+                                      mechanism_.prescribed.size());
     FindPoints();
     AddIndices();
   }
 
   [[nodiscard]] std::string WhyNone() const {
-    if (moving_.size() == mechanism_.drives.size()) return "";
+    if (dofs_ == static_cast<Eigen::Index>(mechanism_.drives.size())) return "";
     return fmt::format("{} drives for {} degrees of freedom: qualities are those of mechanisms with "
                        "as many drives",
-                       mechanism_.drives.size(), moving_.size());
+                       mechanism_.drives.size(), dofs_);
   }
   [[nodiscard]] const std::vector<QualityIndex>& indices() const { return indices_; }
 
   // All values of a pose; NaN of what is not defined.
-  [[nodiscard]] bool Evaluate(ReducedModel* model, const VecX& at, VecX* values) const {
+  [[nodiscard]] bool Evaluate(const PlacedPose& at, VecX* values) const {
     *values = VecX::Constant(static_cast<Eigen::Index>(indices_.size()), kNan);
-    const VecX still = VecX::Zero(model->size());
-    if (!model->Move(at, still, still).ok()) return false;
-    MatX all;
-    if (!model->Motions(&all).ok()) return false;
-    const auto n = static_cast<Eigen::Index>(moving_.size());
-    MatX T(all.rows(), n);
-    for (Eigen::Index k = 0; k < n; ++k) T.col(k) = all.col(moving_[static_cast<size_t>(k)]);
-    const BodyStates& states = model->states();
-    MatX D = model->DriveRates(T);
+    const BodyStates states = space_.States(at.pose);
+    const MatX T = Motions(at, states);
+    const Eigen::Index n = T.cols();
+    if (n != dofs_) return false;
+    const MatX D = DriveRates(states, T);
     const MatX W = TwistOf(output_.body, output_.X_BO.translation(), states, T) -
                    TwistOf(output_.reference_body, ReferencePoint(states), states, T);
     VecX unit(n);
@@ -197,15 +187,53 @@ class QualityMapper {
       for (const double value : {slow, fast, weak, strong}) put(value);
     }
     // (5)
-    const MatX M_d = back.transpose() * model->MassMatrix(T) * back;
-    for (Eigen::Index k = 0; k < n; ++k) put(M_d(k, k));
-    const VecX held = back.transpose() * model->Forces(T, {});
+    MatX M = T.transpose() * internal::Momenta(mechanism_, states, T);
+    M = back.transpose() * (0.5 * (M + M.transpose())) * back;
+    for (Eigen::Index k = 0; k < n; ++k) put(M(k, k));
+    const VecX held = HoldingForces(states, T, back);
     if (limits_.forces) put(Payload(held, -K.bottomRows<3>().transpose() * mechanism_.gravity_W));
-    if (servos_) put(Frequency(model, at, D, M_d));
+    if (servos_) put(Frequency(at, T, D, M));
     return true;
   }
 
  private:
+  // T: twists of the moving bodies, prescribed joints at rest.
+  [[nodiscard]] MatX Motions(const PlacedPose& at, const BodyStates& states) const {
+    const MatX T = space_.Twists(at, states);
+    const auto held = static_cast<Eigen::Index>(mechanism_.prescribed.size());
+    if (held == 0) return T;
+    MatX rates(held, T.cols());
+    for (Eigen::Index p = 0; p < held; ++p) {
+      rates.row(p) = RateOf(
+          CoordinateRow(mechanism_, {Coordinate::Kind::kPrescribed, static_cast<int>(p), 0}, states),
+          T);
+    }
+    const Eigen::FullPivLU<MatX> lu(rates);
+    return T * lu.kernel();
+  }
+  [[nodiscard]] static Eigen::RowVectorXd RateOf(const ScalarRow& row, const MatX& T) {
+    Eigen::RowVectorXd rate = Eigen::RowVectorXd::Zero(T.cols());
+    if (row.parent > 0) rate += row.J_parent.transpose() * T.middleRows<6>(6 * (row.parent - 1));
+    if (row.child > 0) rate += row.J_child.transpose() * T.middleRows<6>(6 * (row.child - 1));
+    return rate;
+  }
+  [[nodiscard]] MatX DriveRates(const BodyStates& states, const MatX& T) const {
+    MatX D(static_cast<Eigen::Index>(mechanism_.drives.size()), T.cols());
+    for (Eigen::Index d = 0; d < D.rows(); ++d) {
+      const Coordinate drive{Coordinate::Kind::kDrive, static_cast<int>(d), 0};
+      D.row(d) = RateOf(CoordinateRow(mechanism_, drive, states), T);
+    }
+    return D;
+  }
+  // Of the drives at rest, beyond no load; friction at rest counts as 0.
+  [[nodiscard]] VecX HoldingForces(const BodyStates& states, const MatX& T,
+                                   const MatX& back) const {
+    std::vector<Vec6> required;
+    internal::RequiredWrenches(mechanism_, states, {},
+                               std::vector<int>(mechanism_.elements.size(), 0), &required);
+    return back.transpose() * (T.transpose() * internal::Stack(required));
+  }
+
   void FindPoints() {
     for (const Joint& joint : mechanism_.joints) {
       if (joint.kind == JointKind::kFree) continue;
@@ -277,46 +305,42 @@ class QualityMapper {
     return std::isfinite(most) ? most : kNan;
   }
 
-  // (6), with the coordinates' steps carried over to the drives.
-  [[nodiscard]] double Frequency(ReducedModel* model, const VecX& at, const MatX& D,
-                                 const MatX& M_d) const {
-    const auto n = static_cast<Eigen::Index>(moving_.size());
-    const VecX still = VecX::Zero(model->size());
+  // (6), with steps of the motions N carried over to the drives.
+  [[nodiscard]] double Frequency(const PlacedPose& at, const MatX& T, const MatX& D,
+                                 const MatX& M) const {
+    const Eigen::Index n = T.cols();
+    if (at.N_free.cols() != n) return kNan;  // prescribed joints
     MatX slope(n, n);
     for (Eigen::Index k = 0; k < n; ++k) {
       std::array<VecX, 2> force;
-      const Eigen::Index column = moving_[static_cast<size_t>(k)];
-      const double step = kStiffnessStep * (IsLength(mechanism_, coordinates_[static_cast<size_t>(column)]) ? length_ : 1.0);
       for (size_t s = 0; s < 2; ++s) {
-        VecX q = at;
-        q[column] += s == 0 ? -step : step;
-        MatX all;
-        if (!model->Move(q, still, still).ok() || !model->Motions(&all).ok()) return kNan;
-        MatX T(all.rows(), n);
-        for (Eigen::Index j = 0; j < n; ++j) T.col(j) = all.col(moving_[static_cast<size_t>(j)]);
-        force.at(s) = model->DriveRates(T).transpose().partialPivLu().solve(model->Forces(T, {}));
+        PlacedPose there;
+        if (!space_.Step(at, (s == 0 ? -kStiffnessStep : kStiffnessStep) * VecX::Unit(n, k), &there)) {
+          return kNan;
+        }
+        const BodyStates states = space_.States(there.pose);
+        const MatX T_there = Motions(there, states);
+        force.at(s) = HoldingForces(states, T_there, DriveRates(states, T_there).inverse());
       }
-      slope.col(k) = (force[1] - force[0]) / (2 * step);
+      slope.col(k) = (force[1] - force[0]) / (2 * kStiffnessStep);
     }
-    MatX K_d = slope * D.inverse();
-    K_d = 0.5 * (K_d + K_d.transpose()).eval();
+    MatX K = slope * D.inverse();
+    K = 0.5 * (K + K.transpose()).eval();
     for (Eigen::Index d = 0; d < n; ++d) {
-      K_d(d, d) += mechanism_.drives[static_cast<size_t>(d)].stiffness;
+      K(d, d) += mechanism_.drives[static_cast<size_t>(d)].stiffness;
     }
-    const Eigen::GeneralizedSelfAdjointEigenSolver<MatX> modes(K_d, M_d, Eigen::EigenvaluesOnly);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatX> modes(K, M, Eigen::EigenvaluesOnly);
     if (modes.info() != Eigen::Success) return kNan;
     const double lowest = modes.eigenvalues()[0];
     return lowest > 0.0 ? std::sqrt(lowest) / (2 * std::numbers::pi) : 0.0;
   }
 
+  const PoseSpace& space_;
   const Mechanism& mechanism_;
-  const SpaceSettings& settings_;
-  const ReachableSet& set_;
   const double length_;
   const Limits limits_;
   const Output& output_;
-  std::vector<Coordinate> coordinates_;
-  std::vector<Eigen::Index> moving_;
+  Eigen::Index dofs_ = 0;
   std::vector<double> drive_unit_;
   std::vector<Vec3> points_;
   std::vector<QualityIndex> indices_;
@@ -371,7 +395,13 @@ QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,
     map.why_none = "the model has no output";
     return map;
   }
-  const QualityMapper mapper(question, set, output);
+  const auto all = static_cast<int>(question.settings.coordinates.size());
+  PoseSpace placing = PoseSpace(question.mechanism, question.settings).Section(all);
+  if (PlacedPose home; !placing.Home(&home)) {
+    map.why_none = "the home pose is singular";
+    return map;
+  }
+  const QualityMapper mapper(placing, output);
   map.why_none = mapper.WhyNone();
   if (!map.why_none.empty()) return map;
   map.indices = mapper.indices();
@@ -380,22 +410,15 @@ QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,
     if (set.flooded.lattice[p].inside) inside.push_back(p);
   }
   std::vector<VecX> values(inside.size());
-  std::vector<Coordinate> coordinates;
-  for (const NamedCoordinate& named : question.settings.coordinates) {
-    coordinates.push_back(named.coordinate);
-  }
-  // Blocks begin at home: nothing depends on the number of threads.
-  const size_t blocks = (inside.size() + kBlock - 1) / kBlock;
   std::atomic<size_t> next = 0;
   const auto run = [&](bool reports) {
-    ReducedModel model(question.mechanism, coordinates);
-    for (size_t b = next++; b < blocks; b = next++) {
-      model.Restart();
-      for (size_t i = b * kBlock; i < std::min(inside.size(), (b + 1) * kBlock); ++i) {
-        const VecX& at = set.flooded.lattice[inside[i]].pose.at;
-        if (!mapper.Evaluate(&model, at, &values[i])) values[i].resize(0);
+    for (size_t i = next++; i < inside.size(); i = next++) {
+      PlacedPose at;
+      if (!placing.Place(set.flooded.lattice[inside[i]].pose, &at) ||
+          !mapper.Evaluate(at, &values[i])) {
+        values[i].resize(0);
       }
-      if (reports && progress) progress(static_cast<double>(b) / static_cast<double>(blocks));
+      if (reports && progress) progress(static_cast<double>(i) / static_cast<double>(inside.size()));
     }
   };
   std::vector<std::thread> others;

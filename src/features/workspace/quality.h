@@ -37,7 +37,7 @@ struct QualityMap {
   std::vector<size_t> points;        ///< of FloodedSet::lattice
   std::vector<VecX> values;          ///< per point and index; NaN where it is not defined
   std::vector<TracedArc> singular;   ///< type-2 curves inside a set of two dimensions
-  size_t missed = 0;                 ///< poses that the reference did not close
+  size_t missed = 0;                 ///< poses that have no values
   std::string why_none;              ///< no map, and why
 };
 

@@ -100,8 +100,9 @@ class QuestionReader {
     Assigned result{.text = std::string(option) + " " + text, .name = {}, .values = {}};
     const size_t equals = text.find('=');
     const std::string given = text.substr(0, equals);
-    const NameInUnit named =
-        SplitUnit(given, [&](const std::string& name) { return Find(name) != nullptr; });
+    const NameInUnit named = SplitUnit(given, [&](const std::string& name) {
+      return of_coordinate ? Find(name) != nullptr : !name.ends_with("_deg");
+    });
     result.name = named.name;
     result.unit = named.unit;
     if (of_coordinate) {
@@ -251,15 +252,39 @@ class QuestionReader {
     }
   }
 
+  // Of x, y, z those that can move while prescribed joints and what --at holds rest.
+  void ChooseFree() {
+    std::vector<NamedCoordinate> candidates;
+    for (const Prescribed& prescribed : question_.mechanism.prescribed) {
+      candidates.push_back(*Find(prescribed.name));
+    }
+    candidates.insert(candidates.end(), at_.begin(), at_.end());
+    const size_t held = candidates.size();
+    for (const char* component : kComponents) {
+      const NamedCoordinate& named = *Find(output_ + "." + component);
+      if (!held_.contains(named.name)) candidates.push_back(named);
+    }
+    std::vector<Coordinate> coordinates;
+    for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
+    const CoordinateChoice choice =
+        ChooseCoordinates(question_.mechanism, coordinates, coordinates.size());
+    for (const size_t k : choice.chosen) {
+      const bool angle = k >= held && candidates[k].coordinate.component >= 3;
+      // Angles only where no length is free.
+      if (k < held || over_.size() == 3 || (angle && !over_.empty() &&
+                                            over_.back().coordinate.component < 3)) {
+        continue;
+      }
+      over_.push_back(candidates[k]);
+    }
+  }
+
   // The free coordinates, those held, then what is left: the output's other coordinates first.
   bool Choose() {
     const Mechanism& m = question_.mechanism;
     SpaceSettings& settings = question_.settings;
     settings.cross_type2 = arguments_.cross_singularities;
-    const bool free_choice = over_.empty();
-    if (free_choice) {
-      for (size_t c = 0; c < 3; ++c) over_.push_back(*Find(kComponents.at(c)));
-    }
+    if (over_.empty()) ChooseFree();
     std::vector<NamedCoordinate> candidates = over_;
     const auto add = [&](const NamedCoordinate& named) {
       if (std::ranges::find(candidates, named.name, &NamedCoordinate::name) == candidates.end()) {
@@ -283,7 +308,7 @@ class QuestionReader {
       return false;
     }
     for (const size_t k : choice.dependent) {
-      if (k >= stated || (free_choice && k < over_.size())) continue;
+      if (k >= stated) continue;
       Error((k < over_.size() ? "--over " : "--at ") + candidates[k].name,
             fmt::format("'{}' is no coordinate of its own at home: those before determine it, or "
                         "it does not move ({} degree{} of freedom)",
@@ -397,9 +422,8 @@ bool PlaceStart(const SetQuestion& question, PoseSpace* space, PlacedPose* start
     if (margin > 0.0 || IsSingularity(bound.kind)) continue;
     diagnostics.AddError(
         file,
-        fmt::format("the pose to begin with is beyond {} ({} {:.4g} {})", bound.name,
-                    margin < 0.0 ? "by" : "margin", std::abs(margin),
-                    bound.kind == SetBound::Kind::kCone ? "rad" : "m or rad"),
+        fmt::format("the pose to begin with is beyond {} by {:.4g} {}", bound.name, -margin,
+                    bound.unit),
         "begin elsewhere by --from, hold other values by --at, or state another --range");
   }
   return !diagnostics.has_errors();
@@ -574,6 +598,12 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
   result.length = space.length();
   result.bounds = space.bounds();
 
+  const FloodPlan plan = PlanFlood(space, start, arguments.flood);
+  if (!plan.summary.ok()) {
+    result.summary = plan.summary;
+    result.verdict = plan.summary.message;
+    return result;
+  }
   // Both ways at once; neither knows of the other.
   FloodSettings flood = arguments.flood;
   std::atomic<double> of_trace = 0.0, of_flood = 0.0;
@@ -582,7 +612,7 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     of_trace = 1.0;
   };
   const auto fill = [&] {
-    result.flooded = FloodSet(space, start, flood, [&](double f) { of_flood = f; });
+    result.flooded = FloodSet(space, start, flood, plan, [&](double f) { of_flood = f; });
     of_flood = 1.0;
   };
   std::vector<std::future<void>> ways;

@@ -168,7 +168,7 @@ TEST(ReachableSet, AFiveBarsCirclesAndSingularCurvesAreThoseOfItsClosedForm) {
                                        std::abs(r2 - 0.6), std::abs(r2 - 0.1)});
           EXPECT_LT(off, 1e-9) << p.transpose();
           ++type1;
-        } else if (r1 < 0.599 && r2 < 0.599) {
+        } else if (std::max(r1, r2) < 0.599 && std::min(r1, r2) > 0.101) {
           // The forearms lie in one line.
           const Eigen::Vector2d a = p - Elbow(p, 0, 1), b = p - Elbow(p, 0.3, -1);
           EXPECT_LT(std::abs(a[0] * b[1] - a[1] * b[0]) / (0.35 * 0.35), 1e-9) << p.transpose();
@@ -184,7 +184,7 @@ TEST(ReachableSet, AFiveBarsCirclesAndSingularCurvesAreThoseOfItsClosedForm) {
 // Three arms of two links hold a platform; home is turned so that nothing is symmetric.
 constexpr const char* k3Rrr = R"(
 name: planar_3rrr
-parameters: {l: {value: 0.25, unit: m}, R: {value: 0.35, unit: m}, r: {value: 0.12, unit: m}}
+parameters: {l: {value: 0.25, unit: m}, f: {value: 0.2, unit: m}, R: {value: 0.35, unit: m}, r: {value: 0.12, unit: m}}
 gravity: [0, 0, 0]
 bodies:
   platform: {mass: 1, inertia: [0.01, 0.01, 0.01]}
@@ -196,7 +196,7 @@ parts:
       platform: {C: {position: [r*cos(phi), r*sin(phi), 0]}}
     bodies:
       upper: {mass: 0.2, inertia: [0.001, 0.001, 0.001], frames: {end: [l, 0, 0]}}
-      fore: {mass: 0.2, inertia: [0.001, 0.001, 0.001], frames: {end: [l, 0, 0]}}
+      fore: {mass: 0.2, inertia: [0.001, 0.001, 0.001], frames: {end: [f, 0, 0]}}
     joints:
       A: {kind: revolute, parent: world.A, child: upper, axis: z, guess: phi + 2.2}
       B: {kind: revolute, parent: upper.end, child: fore, axis: z, guess: 1.6}
@@ -221,14 +221,17 @@ TEST(ReachableSet, SingularCurvesOfA3RrrAreThoseOfItsClosedForm) {
   EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
   // Working modes as at home.
   const std::array<double, 3> phi = {0.2, 2.3, 4.3};
+  const auto foot = [&](size_t i) {
+    return Eigen::Vector2d(0.35 * std::cos(phi.at(i)), 0.35 * std::sin(phi.at(i)));
+  };
   const auto elbow = [&](const Eigen::Vector2d& p, size_t i, double side) {
-    const double yaw = 0.1;
-    const Eigen::Vector2d A(0.35 * std::cos(phi.at(i)), 0.35 * std::sin(phi.at(i)));
     const Eigen::Vector2d C =
-        p + 0.12 * Eigen::Vector2d(std::cos(phi.at(i) + yaw), std::sin(phi.at(i) + yaw));
-    const Eigen::Vector2d d = C - A;
-    const double h = std::sqrt(std::max(0.0625 - 0.25 * d.squaredNorm(), 0.0));
-    return std::pair(C, Eigen::Vector2d(A + 0.5 * d + side * h * Eigen::Vector2d(-d[1], d[0]).normalized()));
+        p + 0.12 * Eigen::Vector2d(std::cos(phi.at(i) + 0.1), std::sin(phi.at(i) + 0.1));
+    const Eigen::Vector2d d = C - foot(i);
+    const double along = (0.0625 - 0.04 + d.squaredNorm()) / (2 * d.norm());
+    const double h = std::sqrt(std::max(0.0625 - along * along, 0.0));
+    return std::pair(C, Eigen::Vector2d(foot(i) + along * d.normalized() +
+                                        side * h * Eigen::Vector2d(-d[1], d[0]).normalized()));
   };
   std::array<double, 3> side{};
   for (size_t i = 0; i < 3; ++i) {
@@ -236,9 +239,9 @@ TEST(ReachableSet, SingularCurvesOfA3RrrAreThoseOfItsClosedForm) {
         robot.FindBody(std::string(1, "abc"[i]) + ".fore"))];
     const Pose& X_WP = robot.X_WB_home[static_cast<size_t>(robot.FindBody("platform"))];
     // At home's own yaw the sign is the same.
-    const Eigen::Vector2d A(0.35 * std::cos(phi.at(i)), 0.35 * std::sin(phi.at(i)));
     const Vec3 C = X_WP * Vec3(0.12 * std::cos(phi.at(i)), 0.12 * std::sin(phi.at(i)), 0);
-    const Eigen::Vector2d d = C.head<2>() - A, b = X_WB.translation().head<2>() - A;
+    const Eigen::Vector2d d = C.head<2>() - foot(i),
+                          b = X_WB.translation().head<2>() - foot(i);
     side.at(i) = d[0] * b[1] - d[1] * b[0] > 0 ? 1.0 : -1.0;
   }
   size_t type1 = 0, type2 = 0;
@@ -252,8 +255,8 @@ TEST(ReachableSet, SingularCurvesOfA3RrrAreThoseOfItsClosedForm) {
           const auto [C, B] = elbow(p, i, side.at(i));
           const Eigen::Vector2d u = (C - B).normalized(), c = C - p;
           lines.row(static_cast<Eigen::Index>(i)) << u[0], u[1], (c[0] * u[1] - c[1] * u[0]) / 0.12;
-          const Eigen::Vector2d A(0.35 * std::cos(phi.at(i)), 0.35 * std::sin(phi.at(i)));
-          stretched = std::min(stretched, std::abs((C - A).norm() - 0.5));
+          const double reach = (C - foot(i)).norm();
+          stretched = std::min({stretched, std::abs(reach - 0.45), std::abs(reach - 0.05)});
         }
         if (kind == SetBound::Kind::kType1) {
           EXPECT_LT(stretched, 1e-9);
@@ -378,7 +381,18 @@ TEST(ReachableSet, EveryShippedModelHasOne) {
       question = ReadQuestion(model, arguments, &diagnostics);
       ASSERT_TRUE(question.has_value()) << model.name << ": " << diagnostics.Text();
     }
-    const ReachableSet set = ComputeReachableSet(*question, arguments);
+    ReachableSet set = ComputeReachableSet(*question, arguments);
+    if (set.summary.stop == Stop::kUnreachable) {  // nothing bounds it: a box does
+      arguments.over.clear();
+      for (int k = 0; k < question->settings.over; ++k) {
+        const std::string& name = question->settings.coordinates[static_cast<size_t>(k)].name;
+        arguments.over.push_back(fmt::format("{}={:.17g}:{:.17g}", name, question->start[k] - 0.1,
+                                             question->start[k] + 0.1));
+      }
+      question = ReadQuestion(model, arguments, &diagnostics);
+      ASSERT_TRUE(question.has_value()) << model.name << ": " << diagnostics.Text();
+      set = ComputeReachableSet(*question, arguments);
+    }
     EXPECT_FALSE(set.diagnostics.has_errors()) << model.name << ": " << set.diagnostics.Text();
     EXPECT_TRUE(set.agree) << model.name << ": " << set.verdict;
     EXPECT_GT(set.traced.measure, 0.0) << model.name;
@@ -401,7 +415,10 @@ TEST(ReachableSet, WhatCannotBeAnsweredIsRefusedWithAReason) {
                     HasSubstr("a value is needed"), HasSubstr("there is no joint 'leg9'")));
   EXPECT_THAT(Refusal(tripod, Over({"x", "y", "z", "roll"})), HasSubstr("one to three"));
   EXPECT_THAT(Refusal(tripod, Over({"x", "y", "yaw"})), HasSubstr("'platform.yaw'"));
-  EXPECT_THAT(Refusal(tripod, Over({"x=2:3", "y"})), HasSubstr("cannot be reached from home"));
+  EXPECT_THAT(Refusal(tripod, Over({"x=2:3", "y"})),
+              HasSubstr("the pose to begin with is beyond leg1 at 0.75 m by 2.0"));
+  EXPECT_THAT(Refusal(ShippedModel("rubbing_five_bar"), Over({"x=2:3", "y"})),
+              HasSubstr("cannot be reached from home: tool.x = 2.5"));
   EXPECT_THAT(Refusal(tripod, Over({"x=3:2", "y"})), HasSubstr("LOW is not below HIGH"));
   EXPECT_THAT(Refusal(tripod, Over({"x", "y", "z"}, 4000)), HasSubstr("takes about"));
   arguments = Over({"x", "y"});
