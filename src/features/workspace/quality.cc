@@ -347,6 +347,43 @@ class QualityMapper {
   bool servos_ = true;
 };
 
+// Where the drives lose their hold inside a set of two dimensions that crosses such poses.
+std::vector<TracedArc> SingularCurves(const SetQuestion& question, const ReachableSet& set) {
+  const auto ends = [&](const std::vector<SetBound>& bounds) {
+    const auto at = std::ranges::find(bounds, SetBound::Kind::kType2, &SetBound::kind);
+    return at == bounds.end() ? -1 : static_cast<int>(at - bounds.begin());
+  };
+  SpaceSettings settings = question.settings;
+  settings.cross_type2 = false;
+  PoseSpace space(question.mechanism, settings);
+  const int bound = ends(space.bounds());
+  PlacedPose start;
+  if (bound < 0 || ends(set.bounds) >= 0 || settings.over != 2 || !space.Home(&start) ||
+      !space.Place(set.start_pose, &start)) {
+    return {};
+  }
+  space.CountFrom(&start);
+  std::map<std::pair<long, long>, std::pair<const SpacePose*, double>> poses;
+  for (const FloodPoint& point : set.flooded.lattice) {
+    PlacedPose at;
+    if (!point.inside || !space.Place(point.pose, &at)) continue;
+    const auto& step = set.flooded.lattice_step;
+    poses[{std::lround((point.at[0] - set.start[0]) / step[0]),
+           std::lround((point.at[1] - set.start[1]) / step[1])}] = {&point.pose, at.type2};
+  }
+  std::vector<std::pair<SpacePose, SpacePose>> across;
+  for (const auto& [key, pose] : poses) {
+    for (const auto& other : {std::pair(key.first + 1, key.second),
+                              std::pair(key.first, key.second + 1)}) {
+      const auto at = poses.find(other);
+      if (at == poses.end() || (at->second.second > 0.0) == (pose.second > 0.0)) continue;
+      const bool first = pose.second > 0.0;
+      across.emplace_back(*(first ? pose : at->second).first, *(first ? at->second : pose).first);
+    }
+  }
+  return TraceInside(space, bound, across);
+}
+
 void Summarise(const ReachableSet& set, QualityMap* map) {
   // Every second pose along each coordinate.
   const auto is_coarse = [&](const Vec3& at) {
@@ -401,6 +438,7 @@ QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,
     map.why_none = "the home pose is singular";
     return map;
   }
+  map.singular = SingularCurves(question, set);
   const QualityMapper mapper(placing, output);
   map.why_none = mapper.WhyNone();
   if (!map.why_none.empty()) return map;

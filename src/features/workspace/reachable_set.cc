@@ -480,7 +480,10 @@ void FindShares(ReachableSet* result) {
     }
     for (const auto& [bound, length] : traced) shares[bound].traced = length / all;
   }
-  for (const auto& [at, bound] : result->traced.ends) shares[bound].traced = 0.5;
+  for (const auto& [at, bound] : result->traced.ends) {
+    double& share = shares[bound].traced;
+    share = std::isfinite(share) ? share + 0.5 : 0.5;
+  }
   std::map<int, double> flooded;
   const auto& vertices = result->flooded.vertices;
   double sum = 0.0;
@@ -596,6 +599,7 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
                            Joined(endless, kMostNamed));
   }
   result.length = space.length();
+  result.start_pose = start.pose;
   result.bounds = space.bounds();
 
   const FloodPlan plan = PlanFlood(space, start, arguments.flood);

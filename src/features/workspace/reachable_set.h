@@ -56,6 +56,7 @@ struct BoundShare {
 struct ReachableSet {
   std::vector<std::string> over, over_units, held, held_units;  ///< "m" or "rad"
   VecX held_values, start;
+  SpacePose start_pose;
   std::vector<CoordinateRange> box;
   double length = kNan;  ///< characteristic [m]
   int dofs = 0, drives = 0;

@@ -151,8 +151,9 @@ class Tracer {
   }
   [[nodiscard]] bool unbounded() const { return unbounded_; }
 
-  // The boundary's loop through a hit.
-  TracedLoop Trace(const Hit& start);
+  // The boundary's loop through a hit; with `open` (1, −1) only its curve in one direction, to where
+  // another margin vanishes.
+  TracedLoop Trace(const Hit& start, int open = 0);
 
   // A way into the set from a pose on the boundary: tangent along the margin's slope.
   [[nodiscard]] VecX Inwards(const PlacedPose& at, int bound) const {
@@ -195,13 +196,15 @@ class Tracer {
   };
   bool OnCurve(const Curve& curve, double tau, double* eta, PlacedPose* to) const {
     double x0 = *eta, f0 = 0.0, x1 = *eta;
+    // Margins have the rounding of numbers about 1.
+    const double within = std::max(1e-13, 4 * kEps / (curve.slope + curve.rate * tau));
     for (int i = 0; i < 12; ++i) {
       if (!space_.Step(*curve.base, tau * curve.t + x1 * curve.n, to)) return false;
       const double f1 = to->pose.margin[curve.bound];
       double step = -f1 / (curve.slope + curve.rate * tau);
       if (i > 0 && f1 != f0) step = -f1 * (x1 - x0) / (f1 - f0);
       if (!std::isfinite(step) || std::abs(step) > 0.5) return false;
-      if (std::abs(step) < 1e-13 || f1 == 0.0) {
+      if (std::abs(step) < within || f1 == 0.0) {
         *eta = x1;
         return true;
       }
@@ -286,7 +289,7 @@ class Tracer {
 };
 
 // All nodes of a step; the first one is the base.
-TracedLoop Tracer::Trace(const Hit& start) {
+TracedLoop Tracer::Trace(const Hit& start, int open) {
   TracedLoop loop;
   Hit here = start;
   const Chebyshev& nodes = Nodes();
@@ -297,6 +300,7 @@ TracedLoop Tracer::Trace(const Hit& start) {
     return loop;
   }
   VecX t = Turned(slope.normalized());
+  if (open < 0) t = -t;
   const Vec2 x_start = ScaledAt(here.at);
   Vec2 along_start = here.at.C_free * t;
   along_start = {along_start[0] / space_.UnitOf(0), along_start[1] / space_.UnitOf(1)};
@@ -327,6 +331,7 @@ TracedLoop Tracer::Trace(const Hit& start) {
     Event event = Event::kNone;
     int corner = -1;
     bool failed = false;
+    const char* why = "no pose is near";
     // First to find what ends the step, then to its end.
     for (int attempt = 0; attempt < 2; ++attempt) {
       double end = h;
@@ -364,6 +369,7 @@ TracedLoop Tracer::Trace(const Hit& start) {
           // Another branch of the same singularity crosses.
           if (!Crossing(at.at(k), here.bound, &crossing, &H)) {
             failed = true;
+            why = "branches of the singularity that cross are not found";
             break;
           }
           const Vec2 there = ScaledAt(crossing);
@@ -409,6 +415,7 @@ TracedLoop Tracer::Trace(const Hit& start) {
       const Vec2 tail = (x * nodes.last.transpose()).cwiseAbs() +
                         (x * nodes.one_before.transpose()).cwiseAbs();
       failed = tail.maxCoeff() > kTail * size && h > kLeastStep;
+      if (failed) why = "it bends too much";
       if (!failed) {
         const Vec2 span = x.rowwise().maxCoeff() - x.rowwise().minCoeff();
         // From the start: less rounding.
@@ -425,22 +432,29 @@ TracedLoop Tracer::Trace(const Hit& start) {
     if (failed) {
       h *= 0.5;
       if (h < kLeastStep) {
-        trouble_ = "the boundary on " +
-                   space_.bounds()[static_cast<size_t>(here.bound)].name + " is lost";
+        trouble_ = fmt::format("the boundary on {} is lost at {:.6g}, {:.6g}: {}",
+                               space_.bounds()[static_cast<size_t>(here.bound)].name,
+                               here.at.pose.at[0], here.at.pose.at[1], why);
         return loop;
       }
       continue;
     }
-    // Directions here and at the last node before, in the tangents of the step's end.
-    PlacedPose& last = at[kDegree - 1];
     const VecX carried = here.at.N_free * t;
-    const VecX along = last.N_free * DirectionAt(last, here.bound, carried);
-    const VecX into = last.N_free * space_.Slope(last, here.bound);
+    VecX along, into;  // at the last node before a crossing
+    if (event == Event::kCrossing && h >= 1e-13) {
+      const PlacedPose& last = at[kDegree - 1];
+      along = last.N_free * DirectionAt(last, here.bound, carried);
+      into = last.N_free * space_.Slope(last, here.bound);
+    } else {
+      along = carried;
+      into = here.at.N_free * n;
+    }
     if (h >= 1e-13) here.at = std::move(at[kDegree]);
     if (event == Event::kCloses) {
       loop.closed = true;
       break;
     }
+    if (open != 0 && event != Event::kNone) break;
     s0 = rate = 0.0;
     if (event == Event::kCrossing) {
       const MatX back = here.at.N_free.transpose();
@@ -468,7 +482,7 @@ TracedLoop Tracer::Trace(const Hit& start) {
   const double unit = space_.UnitOf(0) * space_.UnitOf(1);
   loop.area = left * area * unit;
   loop.error = error * unit;
-  if (!loop.closed && trouble_.empty()) trouble_ = "a boundary does not close";
+  if (!loop.closed && open == 0 && trouble_.empty()) trouble_ = "a boundary does not close";
   return loop;
 }
 
@@ -752,6 +766,32 @@ class SolidTracer {
   std::map<double, TracedSection> sections_;
   std::string lost_;
 };
+
+}  // namespace
+
+std::vector<TracedArc> TraceInside(const PoseSpace& space, int bound,
+                                   const std::vector<std::pair<SpacePose, SpacePose>>& across) {
+  Tracer tracer(space);
+  std::vector<TracedLoop> found;
+  std::vector<TracedArc> arcs;
+  for (const auto& [in, out] : across) {
+    PlacedPose from;
+    if (!space.Place(in, &from)) continue;
+    const VecX ray = (out.at - in.at).head(2);
+    const auto hit = tracer.Walk(from, ray);
+    if (!hit || hit->bound != bound || tracer.Knows(found, *hit)) continue;
+    for (const int open : {1, -1}) {
+      TracedLoop part = tracer.Trace(*hit, open);
+      if (part.arcs.empty()) continue;
+      arcs.push_back(part.arcs.front());
+      found.push_back(std::move(part));
+      if (found.back().closed) break;
+    }
+  }
+  return arcs;
+}
+
+namespace {
 
 TracedSet Unbounded(TracedSet set) {
   set.summary.stop = Stop::kUnreachable;

@@ -51,5 +51,10 @@ struct TracedSet {
                                  const std::function<void(double)>& progress = {},
                                  double share = 1e-9);
 
+/// Curves of two dimensions on which the margin of a bound vanishes, within all the others: from
+/// pairs of poses on both sides of it, the first one where it is positive.
+[[nodiscard]] std::vector<TracedArc> TraceInside(
+    const PoseSpace& space, int bound, const std::vector<std::pair<SpacePose, SpacePose>>& across);
+
 
 }  // namespace mbv
