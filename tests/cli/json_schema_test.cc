@@ -42,6 +42,7 @@ constexpr Call kCalls[] = {
     {"crosscheck four_bar/turn", 0},
     {"crosscheck --newest four_bar/turn", 0},
     {"workspace spr_tripod --no-pictures --out OUT/x", 0},
+    {"workspace four_bar --out OUT/x", 0},
     {"audit spr_tripod", 0},
     {"model four_bar", 0},
     {"model stabilizing_platform", 0},

@@ -290,9 +290,12 @@ WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRe
         "away from singular poses\n",
         yaw, WithError(v.volume_m3, v.uncertainty_m3), v.samples,
         WithError(100.0 * share, 100.0 * share_error));
-    outcome.measures.push_back(
-        {fmt::format("volume at yaw {:g} deg", yaw), v.volume_m3, v.uncertainty_m3, "m3",
-         {"x", "y", "z"}, {{"yaw", yaw * kDegree}}});
+    outcome.measures.push_back({fmt::format("volume at yaw {:g} deg", yaw),
+                                v.volume_m3,
+                                v.uncertainty_m3,
+                                "m3",
+                                {"x", "y", "z"},
+                                {{"yaw", yaw * kDegree}}});
     outcome.measures.push_back({fmt::format("share away from singular poses at yaw {:g} deg", yaw),
                                 share, share_error, "1"});
   }

@@ -20,8 +20,8 @@ namespace {
 
 using Lattice = std::array<int, 3>;
 
-constexpr double kSame = 1e-6;          // two poses of a corner [rad, characteristic lengths]
-constexpr double kCutShare = 1e-4;      // of an edge, to which a cut is found
+constexpr double kSame = 1e-6;      // two poses of a corner [rad, characteristic lengths]
+constexpr double kCutShare = 1e-4;  // of an edge, to which a cut is found
 constexpr int kMostCuts = 30;
 constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]; of a plan
 constexpr int kMostStrides = 10000;
@@ -100,7 +100,8 @@ class Flooder {
   [[nodiscard]] int SpacingAt(int level) const { return 1 << (settings_.halvings - level); }
   [[nodiscard]] VecX At(const Lattice& key) const {
     VecX x = home_.pose.at.head(k_);
-    for (int c = 0; c < k_; ++c) x[c] += set_.step.at(static_cast<size_t>(c)) * key.at(static_cast<size_t>(c));
+    for (int c = 0; c < k_; ++c)
+      x[c] += set_.step.at(static_cast<size_t>(c)) * key.at(static_cast<size_t>(c));
     return x;
   }
   [[nodiscard]] Vec3 PointOf(const VecX& x) const {
@@ -298,7 +299,8 @@ class Flooder {
       std::vector<Lattice> children;
       for (const Lattice& cell : todo) {
         refined.insert(cell);
-        ForEachCorner([&](const Lattice& offset) { children.push_back(Sum(cell, offset, spacing)); });
+        ForEachCorner(
+            [&](const Lattice& offset) { children.push_back(Sum(cell, offset, spacing)); });
       }
       Complete(level, children);
       // Neighbours that a finer corner shows to be cut.
@@ -650,13 +652,12 @@ class Flooder {
 
 }  // namespace
 
-FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home,
-                    const FloodSettings& settings) {
+FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings) {
   FloodPlan plan;
   const auto start = std::chrono::steady_clock::now();
   const int k = space.over();
-  const int resolution = settings.resolution > 0 ? settings.resolution
-                                                 : kUsualResolution.at(static_cast<size_t>(k));
+  const int resolution =
+      settings.resolution > 0 ? settings.resolution : kUsualResolution.at(static_cast<size_t>(k));
   double cells = 1.0;
   long poses = 0;
   for (int c = 0; c < k; ++c) {

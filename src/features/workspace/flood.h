@@ -1,10 +1,11 @@
-// A set of poses by flooding: a lattice of the free coordinates, from corner to neighbouring corner.
+// A set of poses by flooding: a lattice of the free coordinates, from corner to neighbouring
+// corner.
 //
 // A corner belongs to the set where the pose closes, from a neighbour that does, with all margins
-// positive; two poses of one corner are a contradiction. Cells with corners on both sides are halved
-// some times, and so are their neighbours that a finer corner shows to be cut; the last ones are
-// divided into simplices whose edges are cut where the first margin vanishes. What lies inside is
-// summed up [Payne, Toth 1990]. The error is what the last halving changed, of second order.
+// positive; two poses of one corner are a contradiction. Cells with corners on both sides are
+// halved some times, and so are their neighbours that a finer corner shows to be cut; the last ones
+// are divided into simplices whose edges are cut where the first margin vanishes. What lies inside
+// is summed up [Payne, Toth 1990]. The error is what the last halving changed, of second order.
 #pragma once
 
 #include <array>
@@ -18,9 +19,9 @@
 namespace mbv {
 
 struct FloodSettings {
-  int resolution = 0;  ///< finest cells across the set, about; 0: by its dimension
-  int halvings = 2;    ///< of cells at the boundary, 1 … 4
-  int threads = 1;     ///< nothing depends on it
+  int resolution = 0;      ///< finest cells across the set, about; 0: by its dimension
+  int halvings = 2;        ///< of cells at the boundary, 1 … 4
+  int threads = 1;         ///< nothing depends on it
   double most_s = 1200.0;  ///< an estimate beyond refuses
 };
 
@@ -41,10 +42,10 @@ struct FloodPoint {
 
 struct FloodedSet {
   RunSummary summary;
-  std::array<double, 3> step{};   ///< finest spacing per free coordinate
-  double measure = kNan;          ///< length, area or volume
-  double error = kNan;            ///< what the last halving changed
-  std::vector<double> levels;     ///< measures from the coarsest lattice on
+  std::array<double, 3> step{};  ///< finest spacing per free coordinate
+  double measure = kNan;         ///< length, area or volume
+  double error = kNan;           ///< what the last halving changed
+  std::vector<double> levels;    ///< measures from the coarsest lattice on
   std::vector<FloodVertex> vertices;
   std::vector<FloodFacet> facets;   ///< of the finest cells; outward
   std::vector<FloodPoint> lattice;  ///< coarsest corners, the first coordinate fastest

@@ -16,14 +16,14 @@
 namespace mbv {
 namespace {
 
-constexpr double kRank = 1e-9;        // pivots of A below this share of the first are zero
-constexpr double kWeakest = 1e-6;     // at this share of what it is at home a constraint is lost
-constexpr double kClosed = 1e-11;     // a last step [rad, characteristic lengths]
-constexpr double kOpen = 1e-9;        // of rows that were redundant at home [rad, characteristic lengths]
-constexpr double kLongStep = 0.3;     // longer ones are cut [rad, characteristic lengths]
-constexpr double kTrusted = 0.5;      // a correction beyond this share of the step is not
-constexpr double kOverlap = 0.3;      // of the motions before and behind a step: det N₁ᵀ N₂
-constexpr double kSlopeStep = 1e-5;   // of difference quotients [rad, characteristic lengths]
+constexpr double kRank = 1e-9;     // pivots of A below this share of the first are zero
+constexpr double kWeakest = 1e-6;  // at this share of what it is at home a constraint is lost
+constexpr double kClosed = 1e-11;  // a last step [rad, characteristic lengths]
+constexpr double kOpen = 1e-9;  // of rows that were redundant at home [rad, characteristic lengths]
+constexpr double kLongStep = 0.3;    // longer ones are cut [rad, characteristic lengths]
+constexpr double kTrusted = 0.5;     // a correction beyond this share of the step is not
+constexpr double kOverlap = 0.3;     // of the motions before and behind a step: det N₁ᵀ N₂
+constexpr double kSlopeStep = 1e-5;  // of difference quotients [rad, characteristic lengths]
 constexpr int kMostIterations = 14, kMostHalvings = 8;
 
 Eigen::RowVectorXd Projected(const ScalarRow& row, const MatX& J) {
@@ -34,20 +34,24 @@ Eigen::RowVectorXd Projected(const ScalarRow& row, const MatX& J) {
 }  // namespace
 
 const char* WordOf(SetBound::Kind kind) {
-  constexpr std::array<const char*, 7> kWords = {
-      "drive", "joint", "cone", "box", "constraint singularity", "type-1 singularity",
-      "type-2 singularity"};
+  constexpr std::array<const char*, 7> kWords = {"drive",
+                                                 "joint",
+                                                 "cone",
+                                                 "box",
+                                                 "constraint singularity",
+                                                 "type-1 singularity",
+                                                 "type-2 singularity"};
   return kWords.at(static_cast<size_t>(kind));
 }
 
 // All that is evaluated at a pose.
 struct PoseSpace::Rows {
   BodyStates states;
-  MatX J;     // twists of all bodies per scaled step of the tree
-  MatX A;     // (1), scaled
-  VecX r;     // residuals of A
-  MatX C;     // d × n: coordinates, scaled
-  VecX at;    // coordinates
+  MatX J;   // twists of all bodies per scaled step of the tree
+  MatX A;   // (1), scaled
+  VecX r;   // residuals of A
+  MatX C;   // d × n: coordinates, scaled
+  VecX at;  // coordinates
   std::vector<CouplingRow> coupled;
   Eigen::ColPivHouseholderQR<MatX> qr;  // of Aᵀ
   MatX N;
@@ -107,8 +111,8 @@ void PoseSpace::AddRange(const Coordinate& coordinate, SetBound::Kind kind,
       if (bound.watched < 0 || bound.upper != upper || bound.limit != limit) continue;
       const Coordinate& other = watched_[static_cast<size_t>(bound.watched)].coordinate;
       if (other.kind != Coordinate::Kind::kDrive) continue;
-      const auto* on = std::get_if<JointDrive>(
-          &mechanism_->drives[static_cast<size_t>(other.index)].kind);
+      const auto* on =
+          std::get_if<JointDrive>(&mechanism_->drives[static_cast<size_t>(other.index)].kind);
       known = known || (on != nullptr && coordinate.kind == Coordinate::Kind::kJoint &&
                         on->joint == coordinate.index && on->coordinate == coordinate.component);
     }
@@ -136,10 +140,10 @@ void PoseSpace::AddBounds() {
   for (size_t c = 0; c < settings_.cones.size(); ++c) {
     const JointCone& cone = settings_.cones[c];
     const std::string& joint = m.joints[static_cast<size_t>(cone.joint)].name;
-    bounds_.push_back({SetBound::Kind::kCone,
-                       fmt::format("cone of {} at {:.6g}°", joint,
-                                   cone.angle * 180.0 / std::numbers::pi),
-                       joint, true, cone.angle, static_cast<int>(c), "rad"});
+    bounds_.push_back(
+        {SetBound::Kind::kCone,
+         fmt::format("cone of {} at {:.6g}°", joint, cone.angle * 180.0 / std::numbers::pi), joint,
+         true, cone.angle, static_cast<int>(c), "rad"});
   }
   for (size_t k = 0; k < settings_.box.size(); ++k) {
     for (const bool upper : {false, true}) {
@@ -334,8 +338,7 @@ bool PoseSpace::Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const {
   to->watched_free.resize(pose.watched.size(), over);
   for (size_t w = 0; w < watched_.size(); ++w) {
     const auto k = static_cast<Eigen::Index>(w);
-    const ScalarRow row =
-        CoordinateRow(m, watched_[w].coordinate, rows->states, pose.watched[k]);
+    const ScalarRow row = CoordinateRow(m, watched_[w].coordinate, rows->states, pose.watched[k]);
     pose.watched[k] = row.value;
     to->watched_free.row(k) = Projected(row, rows->J) * to->N_free;
   }
@@ -384,7 +387,8 @@ bool PoseSpace::Home(PlacedPose* home) {
   SpacePose& pose = home->pose;
   pose = {};
   pose.X_FM.assign(m.joints.size(), Pose::Identity());
-  for (size_t j = 0; j < m.joints.size(); ++j) pose.X_FM[j] = JointPose(m.joints[j], m.joints[j].home);
+  for (size_t j = 0; j < m.joints.size(); ++j)
+    pose.X_FM[j] = JointPose(m.joints[j], m.joints[j].home);
   const auto d = static_cast<Eigen::Index>(settings_.coordinates.size());
   pose.at.resize(d);
   for (Eigen::Index k = 0; k < d; ++k) {

@@ -7,8 +7,8 @@
 // δ are the coordinates' steps of the spanning tree's joints, lengths by the characteristic length.
 // The d coordinates are those of a set (`over`, free) and those that are held. det G = 0: the
 // mechanism moves while the coordinates rest, type 1; det D = 0: it moves while the drives rest,
-// type 2 [Gosselin, Angeles 1990]; A loses rank: a constraint singularity [Zlatanov 2002]. N carries
-// its orientation from pose to pose, so that both determinants change their signs there.
+// type 2 [Gosselin, Angeles 1990]; A loses rank: a constraint singularity [Zlatanov 2002]. N
+// carries its orientation from pose to pose, so that both determinants change their signs there.
 //
 // Neither way to a set of poses (flood.h, trace.h) uses more of the other than this file.
 #pragma once
@@ -32,7 +32,7 @@ struct SetBound {
   std::string subject;  ///< of drive, joint or coordinate; "" of singularities
   bool upper = false;
   double limit = 0.0;  ///< [m or rad]
-  int watched = -1;  ///< of SpacePose::watched, of kBox a coordinate, of kCone one of the cones
+  int watched = -1;    ///< of SpacePose::watched, of kBox a coordinate, of kCone one of the cones
   std::string unit = "1";  ///< of its margin: "m", "rad", "1"
 };
 [[nodiscard]] const char* WordOf(SetBound::Kind kind);
@@ -137,7 +137,8 @@ class PoseSpace {
   /// Rows (1) and the coordinates at a pose.
   void Evaluate(SpacePose* pose, Rows* rows) const;
   [[nodiscard]] bool Factor(Rows* rows) const;
-  /// From a predicted pose to one that closes; `target` of all coordinates or, empty, of those held.
+  /// From a predicted pose to one that closes; `target` of all coordinates or, empty, of those
+  /// held.
   [[nodiscard]] bool Correct(const PlacedPose& from, const VecX& target, double most,
                              PlacedPose* to) const;
   [[nodiscard]] bool Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const;

@@ -18,10 +18,10 @@
 namespace mbv {
 namespace {
 
-constexpr double kRankShare = 1e-9;      // smaller singular values are none
-constexpr double kSingularShare = 1e-12; // of D: no (1)
-constexpr double kStiffnessStep = 1e-5;  // [rad, characteristic lengths]
-constexpr Eigen::Index kMostDrives = 12; // of corners
+constexpr double kRankShare = 1e-9;       // smaller singular values are none
+constexpr double kSingularShare = 1e-12;  // of D: no (1)
+constexpr double kStiffnessStep = 1e-5;   // [rad, characteristic lengths]
+constexpr Eigen::Index kMostDrives = 12;  // of corners
 
 // Reach of {K ṁ : |ṁ_i| ≤ 1} within the space that K spans: least and largest.
 std::pair<double, double> ZonotopeReach(const MatX& K) {
@@ -132,9 +132,10 @@ class QualityMapper {
 
   [[nodiscard]] std::string WhyNone() const {
     if (dofs_ == static_cast<Eigen::Index>(mechanism_.drives.size())) return "";
-    return fmt::format("{} drives for {} degrees of freedom: qualities are those of mechanisms with "
-                       "as many drives",
-                       mechanism_.drives.size(), dofs_);
+    return fmt::format(
+        "{} drives for {} degrees of freedom: qualities are those of mechanisms with "
+        "as many drives",
+        mechanism_.drives.size(), dofs_);
   }
   [[nodiscard]] const std::vector<QualityIndex>& indices() const { return indices_; }
 
@@ -166,8 +167,7 @@ class QualityMapper {
       S.middleRows<3>(3 * static_cast<Eigen::Index>(p)) =
           TwistOf(output_.body, points_[p], states, T).bottomRows<3>();
     }
-    S *= back * unit.cwiseInverse().asDiagonal() /
-         std::sqrt(static_cast<double>(points_.size()));
+    S *= back * unit.cwiseInverse().asDiagonal() / std::sqrt(static_cast<double>(points_.size()));
     const VecX rms = Eigen::JacobiSVD<MatX>(S).singularValues();
     put(rms[0] > 0.0 ? 1.0 / rms[0] : kNan);
     put(rms[rms.size() - 1]);
@@ -204,9 +204,10 @@ class QualityMapper {
     if (held == 0) return T;
     MatX rates(held, T.cols());
     for (Eigen::Index p = 0; p < held; ++p) {
-      rates.row(p) = RateOf(
-          CoordinateRow(mechanism_, {Coordinate::Kind::kPrescribed, static_cast<int>(p), 0}, states),
-          T);
+      rates.row(p) =
+          RateOf(CoordinateRow(mechanism_, {Coordinate::Kind::kPrescribed, static_cast<int>(p), 0},
+                               states),
+                 T);
     }
     const Eigen::FullPivLU<MatX> lu(rates);
     return T * lu.kernel();
@@ -253,11 +254,14 @@ class QualityMapper {
     indices_.push_back({std::move(name), std::move(unit), std::move(about), low_is_bad});
   }
   void AddIndices() {
-    const std::string speed = limits_.speeds ? "at the motors' highest speeds" : "per unit speed of each drive";
-    const std::string force = limits_.forces ? "at the motors' torques" : "per unit force of each drive";
+    const std::string speed =
+        limits_.speeds ? "at the motors' highest speeds" : "per unit speed of each drive";
+    const std::string force =
+        limits_.forces ? "at the motors' torques" : "per unit force of each drive";
     Add("type2_distance", "1", "least speed of the drives by that of the output's body (type 2)");
     Add("type1_distance", "1", "least speed of the output's body by that of the drives (type 1)");
-    Add("condition", "1", fmt::format("of the twist by the drives' speeds, lengths by {:.4g} m", length_), false);
+    Add("condition", "1",
+        fmt::format("of the twist by the drives' speeds, lengths by {:.4g} m", length_), false);
     Add("manipulability", "1", "product of its singular values");
     Add("speed_least", "m/s", "in every direction, " + speed);
     Add("speed_most", "m/s", "in the best direction, " + speed);
@@ -299,7 +303,8 @@ class QualityMapper {
       const double left = limits_.force[k] - std::abs(held[k]);
       if (left < 0.0) return 0.0;
       if (per_mass[k] == 0.0) continue;
-      const double room = per_mass[k] > 0.0 ? limits_.force[k] - held[k] : limits_.force[k] + held[k];
+      const double room =
+          per_mass[k] > 0.0 ? limits_.force[k] - held[k] : limits_.force[k] + held[k];
       most = std::min(most, room / std::abs(per_mass[k]));
     }
     return std::isfinite(most) ? most : kNan;
@@ -315,7 +320,8 @@ class QualityMapper {
       std::array<VecX, 2> force;
       for (size_t s = 0; s < 2; ++s) {
         PlacedPose there;
-        if (!space_.Step(at, (s == 0 ? -kStiffnessStep : kStiffnessStep) * VecX::Unit(n, k), &there)) {
+        if (!space_.Step(at, (s == 0 ? -kStiffnessStep : kStiffnessStep) * VecX::Unit(n, k),
+                         &there)) {
           return kNan;
         }
         const BodyStates states = space_.States(there.pose);
@@ -373,8 +379,8 @@ std::vector<TracedArc> SingularCurves(const SetQuestion& question, const Reachab
   }
   std::vector<std::pair<SpacePose, SpacePose>> across;
   for (const auto& [key, pose] : poses) {
-    for (const auto& other : {std::pair(key.first + 1, key.second),
-                              std::pair(key.first, key.second + 1)}) {
+    for (const auto& other :
+         {std::pair(key.first + 1, key.second), std::pair(key.first, key.second + 1)}) {
       const auto at = poses.find(other);
       if (at == poses.end() || (at->second.second > 0.0) == (pose.second > 0.0)) continue;
       const bool first = pose.second > 0.0;
@@ -456,7 +462,8 @@ QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,
           !mapper.Evaluate(at, &values[i])) {
         values[i].resize(0);
       }
-      if (reports && progress) progress(static_cast<double>(i) / static_cast<double>(inside.size()));
+      if (reports && progress)
+        progress(static_cast<double>(i) / static_cast<double>(inside.size()));
     }
   };
   std::vector<std::thread> others;

@@ -1,14 +1,14 @@
 // How well a mechanism moves and carries at the poses of a set.
 //
-//   K = W D⁻¹        twist of the output by the drives' rates: W, D per rate of the coordinates  (1)
+//   K = W D⁻¹        twist of the output by the drives' rates: W, D per rate of the coordinates (1)
 //   v = K ṁ, |ṁ_i| ≤ s_i: a zonotope; its inscribed sphere is the least speed in every direction,
-//       its farthest corner the largest [Fukuda 2004; Krut 2004]                                 (2)
-//   τ = Kᵀ w, |τ_i| ≤ t_i: a polytope of forces at the output's origin, the same of moments      (3)
+//       its farthest corner the largest [Fukuda 2004; Krut 2004] (2)
+//   τ = Kᵀ w, |τ_i| ≤ t_i: a polytope of forces at the output's origin, the same of moments (3)
 //   V(y)² = mean of |v|² over the points where joints hold the output's body, ṁ(y) with angles
-//       by the characteristic length: type-2 distance min |ṁ|/V, type-1 distance min V/|ṁ|       (4)
-//   M_d = D⁻ᵀ M D⁻¹   mass matrix as the drives feel it                                          (5)
-//   det(K_d − ω² M_d) = 0, K_d = ∂(drive forces at rest)/∂m + servos' stiffness                  (6)
-//   |τ_g + m Kᵀ g| ≤ t: the payload m at the output's origin that motors hold                    (7)
+//       by the characteristic length: type-2 distance min |ṁ|/V, type-1 distance min V/|ṁ| (4)
+//   M_d = D⁻ᵀ M D⁻¹   mass matrix as the drives feel it (5) det(K_d − ω² M_d) = 0, K_d = ∂(drive
+//   forces at rest)/∂m + servos' stiffness                  (6) |τ_g + m Kᵀ g| ≤ t: the payload m
+//   at the output's origin that motors hold                    (7)
 //
 // (4) measures points of the body alone: it depends on no frame [Voglewede, Ebert-Uphoff 2005].
 #pragma once
@@ -34,11 +34,11 @@ struct QualityIndex {
 struct QualityMap {
   std::string output;
   std::vector<QualityIndex> indices;
-  std::vector<size_t> points;        ///< of FloodedSet::lattice
-  std::vector<VecX> values;          ///< per point and index; NaN where it is not defined
-  std::vector<TracedArc> singular;   ///< type-2 curves inside a set of two dimensions
-  size_t missed = 0;                 ///< poses that have no values
-  std::string why_none;              ///< no map, and why
+  std::vector<size_t> points;       ///< of FloodedSet::lattice
+  std::vector<VecX> values;         ///< per point and index; NaN where it is not defined
+  std::vector<TracedArc> singular;  ///< type-2 curves inside a set of two dimensions
+  size_t missed = 0;                ///< poses that have no values
+  std::string why_none;             ///< no map, and why
 };
 
 [[nodiscard]] QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,

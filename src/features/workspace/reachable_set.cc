@@ -81,7 +81,9 @@ class QuestionReader {
     std::vector<std::string> names;
     for (const Output& output : m.outputs) names.push_back(output.name);
     Error("--output " + output_, "there is no such output",
-          DidYouMean(output_, names, names.empty() ? "the model has none" : "there are: " + Joined(names, kMostNamed)));
+          DidYouMean(
+              output_, names,
+              names.empty() ? "the model has none" : "there are: " + Joined(names, kMostNamed)));
     return false;
   }
 
@@ -163,7 +165,8 @@ class QuestionReader {
       box_.push_back(box);
     }
     if (over_.size() > 3) {
-      Error("--over", fmt::format("{} coordinates are stated: a set has one to three", over_.size()),
+      Error("--over",
+            fmt::format("{} coordinates are stated: a set has one to three", over_.size()),
             "hold the others by --at");
     }
   }
@@ -230,8 +233,8 @@ class QuestionReader {
       if (!assigned) continue;
       JointCone cone;
       std::string name = assigned->name;
-      for (const auto& [end, axis] : {std::pair(".x", Vec3(1, 0, 0)), {".y", Vec3(0, 1, 0)},
-                                      {".z", Vec3(0, 0, 1)}}) {
+      for (const auto& [end, axis] :
+           {std::pair(".x", Vec3(1, 0, 0)), {".y", Vec3(0, 1, 0)}, {".z", Vec3(0, 0, 1)}}) {
         if (m.FindJoint(name) >= 0 || !name.ends_with(end)) continue;
         name.resize(name.size() - 2);
         cone.axis = axis;
@@ -271,8 +274,8 @@ class QuestionReader {
     for (const size_t k : choice.chosen) {
       const bool angle = k >= held && candidates[k].coordinate.component >= 3;
       // Angles only where no length is free.
-      if (k < held || over_.size() == 3 || (angle && !over_.empty() &&
-                                            over_.back().coordinate.component < 3)) {
+      if (k < held || over_.size() == 3 ||
+          (angle && !over_.empty() && over_.back().coordinate.component < 3)) {
         continue;
       }
       over_.push_back(candidates[k]);
@@ -309,11 +312,12 @@ class QuestionReader {
     }
     for (const size_t k : choice.dependent) {
       if (k >= stated) continue;
-      Error((k < over_.size() ? "--over " : "--at ") + candidates[k].name,
-            fmt::format("'{}' is no coordinate of its own at home: those before determine it, or "
-                        "it does not move ({} degree{} of freedom)",
-                        candidates[k].name, choice.dofs, choice.dofs == 1 ? "" : "s"),
-            "leave it out, or choose others: " + Joined(Independent(candidates, choice), kMostNamed));
+      Error(
+          (k < over_.size() ? "--over " : "--at ") + candidates[k].name,
+          fmt::format("'{}' is no coordinate of its own at home: those before determine it, or "
+                      "it does not move ({} degree{} of freedom)",
+                      candidates[k].name, choice.dofs, choice.dofs == 1 ? "" : "s"),
+          "leave it out, or choose others: " + Joined(Independent(candidates, choice), kMostNamed));
     }
     if (failed_) return false;
     std::vector<NamedCoordinate> chosen;
@@ -463,7 +467,8 @@ void CheckByReference(const SetQuestion& question, const PoseSpace& space, Reach
 
 double LengthOf(const TracedArc& arc) {
   double length = 0.0;
-  for (size_t k = 1; k < arc.points.size(); ++k) length += (arc.points[k] - arc.points[k - 1]).norm();
+  for (size_t k = 1; k < arc.points.size(); ++k)
+    length += (arc.points[k] - arc.points[k - 1]).norm();
   return length;
 }
 

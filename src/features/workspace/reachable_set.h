@@ -18,12 +18,12 @@ namespace mbv {
 /// As a user writes it. Coordinates are the output's x … yaw, or named as in Model::coordinates();
 /// names may end in a unit (_mm, _deg).
 struct SetArguments {
-  std::string output;               ///< "": the first one
-  std::vector<std::string> over;    ///< "x", "x_mm=-100:100"
-  std::vector<std::string> at;      ///< "z=-0.165": held there; what is left stays at home
-  std::vector<std::string> from;    ///< "x=0.1": a pose of the set, where home is none
-  std::vector<std::string> ranges;  ///< "leg1=0.5:0.75": instead of the model's
-  std::vector<std::string> cones;   ///< "ball_deg=30", "ball.x_deg=30": of the axis z, or x or y
+  std::string output;                ///< "": the first one
+  std::vector<std::string> over;     ///< "x", "x_mm=-100:100"
+  std::vector<std::string> at;       ///< "z=-0.165": held there; what is left stays at home
+  std::vector<std::string> from;     ///< "x=0.1": a pose of the set, where home is none
+  std::vector<std::string> ranges;   ///< "leg1=0.5:0.75": instead of the model's
+  std::vector<std::string> cones;    ///< "ball_deg=30", "ball.x_deg=30": of the axis z, or x or y
   bool cross_singularities = false;  ///< type 2 ends nothing
   FloodSettings flood;
 
@@ -37,8 +37,8 @@ struct SetArguments {
 struct SetQuestion {
   Mechanism mechanism;  ///< with the ranges of the question
   SpaceSettings settings;
-  VecX start;                      ///< the d coordinates of a pose of the set
-  std::string output;              ///< "" where the model has none
+  VecX start;          ///< the d coordinates of a pose of the set
+  std::string output;  ///< "" where the model has none
   bool ranges_changed = false, boxed = false;
   std::vector<std::string> notes;  ///< what was taken otherwise or left out
 };
@@ -66,10 +66,10 @@ struct ReachableSet {
   FloodedSet flooded;
   std::vector<BoundShare> shares;
   bool agree = false;
-  std::string verdict;      ///< a sentence
-  std::string unit;         ///< of the measure: "m³"
-  std::string measure;      ///< "volume"
-  size_t checked = 0;       ///< poses that the reference closed anew
+  std::string verdict;       ///< a sentence
+  std::string unit;          ///< of the measure: "m³"
+  std::string measure;       ///< "volume"
+  size_t checked = 0;        ///< poses that the reference closed anew
   double checked_off = 0.0;  ///< largest difference of drives and outputs there [m or rad]
   size_t unchecked = 0;      ///< that it did not close
   RunSummary summary;

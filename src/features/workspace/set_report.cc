@@ -9,7 +9,6 @@
 #include <map>
 #include <numbers>
 
-#include "base/json_text.h"
 #include "base/text.h"
 #include "base/worker_pool.h"
 #include "plot/svg_plot.h"
@@ -59,8 +58,8 @@ std::string HeldText(const ReachableSet& set) {
   for (size_t k = 0; k < set.held.size(); ++k) {
     const std::string& unit = set.held_units[k];
     const double value = Shown(set.held_values[static_cast<Eigen::Index>(k)], unit);
-    parts.push_back(fmt::format("{} = {:.5g} {}", set.held[k], std::abs(value) < 1e-12 ? 0.0 : value,
-                                ShownUnit(unit)));
+    parts.push_back(fmt::format("{} = {:.5g} {}", set.held[k],
+                                std::abs(value) < 1e-12 ? 0.0 : value, ShownUnit(unit)));
   }
   return Joined(parts);
 }
@@ -73,14 +72,14 @@ std::string HeadLine(const SetReport& report) {
 
 Table WaysTable(const SetReport& report) {
   const ReachableSet& set = report.set;
-  Table table{.name = "workspace_ways",
-              .caption = fmt::format("The {} by independent ways [{}]", set.measure, set.unit),
-              .columns = {Text("way"), Digits(set.measure), Digits("poses closed"),
-                          Digits("time [s]")}};
+  Table table{
+      .name = "workspace_ways",
+      .caption = fmt::format("The {} by independent ways [{}]", set.measure, set.unit),
+      .columns = {Text("way"), Digits(set.measure), Digits("poses closed"), Digits("time [s]")}};
   const auto row = [&](const char* way, double value, double error, long closings, double wall) {
     if (closings == 0) return;
-    table.rows.push_back({way, WithError(value, error), fmt::format("{}", closings),
-                          fmt::format("{:.2f}", wall)});
+    table.rows.push_back(
+        {way, WithError(value, error), fmt::format("{}", closings), fmt::format("{:.2f}", wall)});
   };
   row(set.over.size() == 1 ? "path to both ends" : "boundary, traced and integrated",
       set.traced.measure, set.traced.error, set.traced.closings, set.traced.wall_s);
@@ -113,7 +112,8 @@ Table LevelsTable(const ReachableSet& set) {
     const double factor = std::exp2(static_cast<double>(set.flooded.levels.size() - 1 - k));
     std::vector<std::string> sizes;
     for (size_t c = 0; c < set.over.size(); ++c) {
-      sizes.push_back(fmt::format("{:.3g} {}", Shown(factor * set.flooded.step.at(c), set.over_units[c]),
+      sizes.push_back(fmt::format("{:.3g} {}",
+                                  Shown(factor * set.flooded.step.at(c), set.over_units[c]),
                                   ShownUnit(set.over_units[c])));
     }
     const double value = set.flooded.levels[k];
@@ -131,10 +131,10 @@ Table QualityTable(const SetReport& report) {
                           Digits("most"), Wide("at its worst")}};
   for (const QualityIndex& index : report.quality.indices) {
     if (!std::isfinite(index.mean)) continue;
-    table.rows.push_back({index.name, index.unit,
-                          fmt::format("{:.4g} ± {:.0e}", index.mean, index.mean_error),
-                          fmt::format("{:.4g}", index.least), fmt::format("{:.4g}", index.most),
-                          PlaceText(report.set, index.low_is_bad ? index.least_at : index.most_at)});
+    table.rows.push_back(
+        {index.name, index.unit, fmt::format("{:.4g} ± {:.0e}", index.mean, index.mean_error),
+         fmt::format("{:.4g}", index.least), fmt::format("{:.4g}", index.most),
+         PlaceText(report.set, index.low_is_bad ? index.least_at : index.most_at)});
   }
   return table;
 }
@@ -276,9 +276,9 @@ std::vector<std::pair<std::string, std::string>> Figures(const SetReport& report
   for (size_t i = 0; i < report.quality.indices.size(); ++i) {
     const QualityIndex& index = report.quality.indices[i];
     if (!std::isfinite(index.mean) || set.over.size() > 2) continue;
-    figures.emplace_back("quality_" + index.name + ".svg",
-                         set.over.size() == 2 ? ToSvg(QualityPlot(report, i))
-                                              : ToSvg(QualityLine(report, i)));
+    figures.emplace_back("quality_" + index.name + ".svg", set.over.size() == 2
+                                                               ? ToSvg(QualityPlot(report, i))
+                                                               : ToSvg(QualityLine(report, i)));
   }
   return figures;
 }
@@ -290,8 +290,8 @@ Paragraph VerdictOf(const SetReport& report) {
   if (!set.summary.ok()) return {set.verdict, Paragraph::Look::kReason};
   std::string text = std::string(report.agree() ? "AGREE: " : "DISAGREE: ") + set.verdict;
   for (const KnownMeasure& known : report.known) {
-    text += fmt::format("; {} is {:.1e} {} off", known.way, known.value - set.traced.measure,
-                        set.unit);
+    text +=
+        fmt::format("; {} is {:.1e} {} off", known.way, known.value - set.traced.measure, set.unit);
   }
   return {text, report.agree() ? Paragraph::Look::kPlain : Paragraph::Look::kReason};
 }
@@ -307,7 +307,8 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
   reached.Note(
       "Both ways close poses with the same code and evaluate the same margins of bounds; nothing "
       "else is common. Error of the boundary: last coefficients of its polynomials, and of three "
-      "dimensions the Gauss–Kronrod rule's; of the lattice: what the last halving changed, and a quarter "
+      "dimensions the Gauss–Kronrod rule's; of the lattice: what the last halving changed, and a "
+      "quarter "
       "of the cells where bounds meet.");
   Items notes{set.notes};
   if (set.checked + set.unchecked > 0) {
@@ -423,7 +424,9 @@ std::string PosesCsv(const SetReport& report) {
   return csv;
 }
 
-bool IsSolid(const ReachableSet& set) { return set.over.size() == 3 && !set.flooded.facets.empty(); }
+bool IsSolid(const ReachableSet& set) {
+  return set.over.size() == 3 && !set.flooded.facets.empty();
+}
 
 TriangleMesh MeshOf(const ReachableSet& set) {
   TriangleMesh mesh;
@@ -574,8 +577,8 @@ std::vector<std::pair<TriangleMesh, std::string>> ColoredSurface(const Reachable
     const int of = bound(1) == bound(2) ? bound(1) : bound(0);
     std::array<int, 3> triangle{};
     for (size_t k = 0; k < 3; ++k) {
-      const auto [at, is_new] = index[of].try_emplace(
-          facet.vertices.at(k), static_cast<int>(meshes[of].vertices.size()));
+      const auto [at, is_new] =
+          index[of].try_emplace(facet.vertices.at(k), static_cast<int>(meshes[of].vertices.size()));
       if (is_new) {
         meshes[of].vertices.push_back(
             set.flooded.vertices[static_cast<size_t>(facet.vertices.at(k))].at);
@@ -585,7 +588,8 @@ std::vector<std::pair<TriangleMesh, std::string>> ColoredSurface(const Reachable
     meshes[of].triangles.push_back(triangle);
   }
   std::vector<std::pair<TriangleMesh, std::string>> colored;
-  for (auto& [bound, mesh] : meshes) colored.emplace_back(std::move(mesh), ColorOfBound(set, bound));
+  for (auto& [bound, mesh] : meshes)
+    colored.emplace_back(std::move(mesh), ColorOfBound(set, bound));
   return colored;
 }
 

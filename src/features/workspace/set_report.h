@@ -1,11 +1,11 @@
 // What is known of a reachable set: text, page, files.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/json_text.h"
 #include "features/workspace/quality.h"
 #include "report/document.h"
 

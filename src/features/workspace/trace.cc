@@ -17,13 +17,13 @@ namespace {
 using Vec2 = Eigen::Vector2d;
 using std::numbers::pi;
 
-constexpr int kDegree = 8;              // of the polynomials along a step
-constexpr double kTail = 1e-9;          // last coefficients by the size of the set
-constexpr double kBeyond = 1e-9;        // margins below −this are outside
-constexpr double kBeside = 1e-6;         // of a difference quotient beside a curve
-constexpr double kLeastStep = 1e-7;     // [rad, characteristic lengths]
+constexpr int kDegree = 8;           // of the polynomials along a step
+constexpr double kTail = 1e-9;       // last coefficients by the size of the set
+constexpr double kBeyond = 1e-9;     // margins below −this are outside
+constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
+constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
-constexpr double kFar = 200.0;          // a ray that goes on for so long has no end
+constexpr double kFar = 200.0;  // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000;
 constexpr int kRays = 8, kChords = 12;  // from home; from each loop
 constexpr int kMostSections = 1200;
@@ -52,7 +52,7 @@ double Root(const F& f, double a, double fa, double b, double fb, double toleran
 // Interpolation in Chebyshev–Lobatto nodes on [0, 1].
 struct Chebyshev {
   std::array<double, kDegree + 1> node{};
-  Eigen::MatrixXd area;          // ∫ l_a l_b′
+  Eigen::MatrixXd area;                 // ∫ l_a l_b′
   Eigen::RowVectorXd last, one_before;  // coefficients of T_n and T_{n−1}
 
   Chebyshev() {
@@ -151,8 +151,8 @@ class Tracer {
   }
   [[nodiscard]] bool unbounded() const { return unbounded_; }
 
-  // The boundary's loop through a hit; with `open` (1, −1) only its curve in one direction, to where
-  // another margin vanishes.
+  // The boundary's loop through a hit; with `open` (1, −1) only its curve in one direction, to
+  // where another margin vanishes.
   TracedLoop Trace(const Hit& start, int open = 0);
 
   // A way into the set from a pose on the boundary: tangent along the margin's slope.
@@ -176,8 +176,8 @@ class Tracer {
         PlacedPose there;
         return space_.Step(at, s * along, &there) ? there.pose.margin[j] : kNan;
       };
-      const double s = Root(margin, 0.0, std::max(at.pose.margin[j], 0.0), h,
-                            next.pose.margin[j], 1e-14);
+      const double s =
+          Root(margin, 0.0, std::max(at.pose.margin[j], 0.0), h, next.pose.margin[j], 1e-14);
       if (bound >= 0 && s >= first) continue;
       first = s;
       bound = static_cast<int>(j);
@@ -295,8 +295,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   const Chebyshev& nodes = Nodes();
   VecX slope = space_.Slope(here.at, here.bound);
   if (!(slope.norm() > 1e-12)) {
-    trouble_ = "a bound's margin has no slope: " +
-               space_.bounds()[static_cast<size_t>(here.bound)].name;
+    trouble_ =
+        "a bound's margin has no slope: " + space_.bounds()[static_cast<size_t>(here.bound)].name;
     return loop;
   }
   VecX t = Turned(slope.normalized());
@@ -321,8 +321,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   enum class Event { kNone, kCorner, kCloses, kCrossing };
   for (int step = 0; step < kMostSteps; ++step) {
     const Curve curve{&here.at, here.bound, t, n, s0, rate};
-    const bool singular =
-        IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
+    const bool singular = IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
     std::array<PlacedPose, kDegree + 1> at;
     at[0] = here.at;
     std::array<double, kDegree + 1> eta{};
@@ -341,8 +340,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
           break;
         }
         const double tau = h * nodes.node.at(k);
-        double e = k > 1 ? eta.at(k - 1) * std::pow(nodes.node.at(k) / nodes.node.at(k - 1), 2)
-                         : 0.0;
+        double e =
+            k > 1 ? eta.at(k - 1) * std::pow(nodes.node.at(k) / nodes.node.at(k - 1), 2) : 0.0;
         failed = !OnCurve(curve, tau, &e, &at.at(k));
         eta.at(k) = e;
         if (failed || attempt > 0) continue;
@@ -412,8 +411,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
         x.col(static_cast<Eigen::Index>(k)) = ScaledAt(at.at(k));
       }
       size = std::max(size, (x.colwise() - x_start).colwise().norm().maxCoeff());
-      const Vec2 tail = (x * nodes.last.transpose()).cwiseAbs() +
-                        (x * nodes.one_before.transpose()).cwiseAbs();
+      const Vec2 tail =
+          (x * nodes.last.transpose()).cwiseAbs() + (x * nodes.one_before.transpose()).cwiseAbs();
       failed = tail.maxCoeff() > kTail * size && h > kLeastStep;
       if (failed) why = "it bends too much";
       if (!failed) {
@@ -494,8 +493,8 @@ bool Tracer::Knows(const std::vector<TracedLoop>& loops, const Hit& hit) const {
       for (size_t k = 1; k < arc.points.size(); ++k) {
         const Vec2 a = arc.points[k - 1].cwiseQuotient(unit), b = arc.points[k].cwiseQuotient(unit);
         const double length = (b - a).norm();
-        const double s = length > 0.0 ? std::clamp((p - a).dot(b - a) / (length * length), 0.0, 1.0)
-                                      : 0.0;
+        const double s =
+            length > 0.0 ? std::clamp((p - a).dot(b - a) / (length * length), 0.0, 1.0) : 0.0;
         if ((a + s * (b - a) - p).norm() < 0.1 * length + 1e-9) return true;
       }
     }
@@ -547,8 +546,8 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
     const VecX in = Inwards(from.at, from.bound);
     PlacedPose near;
     double first = 1e-3;
-    while (first > 1e-9 && !(space_.Step(from.at, first * in, &near) &&
-                             near.pose.margin.minCoeff() > 0.0)) {
+    while (first > 1e-9 &&
+           !(space_.Step(from.at, first * in, &near) && near.pose.margin.minCoeff() > 0.0)) {
       first *= 0.1;
     }
     if (first <= 1e-9) continue;
@@ -740,8 +739,8 @@ class SolidTracer {
       return total;
     };
     const double start = sum(&Part::error);
-    while (sum(&Part::error) > share_ * sum(&Part::value) &&
-           sections_.size() < kMostSections && lost_.empty()) {
+    while (sum(&Part::error) > share_ * sum(&Part::value) && sections_.size() < kMostSections &&
+           lost_.empty()) {
       const auto worst = std::ranges::max_element(parts, {}, &Part::error);
       const double a = worst->a, b = worst->b, middle = 0.5 * (a + b);
       *worst = Rule(a, middle);

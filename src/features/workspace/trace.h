@@ -1,11 +1,11 @@
 // A set of poses by its boundary: traced bound by bound, and integrated by quadrature.
 //
 // Two dimensions: from a pose inside, straight rays end at bounds; each bound's curve
-// {margin_i = 0} is followed on the manifold of poses (so that folds, type 1, are regular curves) to
-// the corner where another margin vanishes, and on along that, until the loop closes. Each step is a
-// polynomial of degree 8 in its Chebyshev nodes, every node and corner a solution of the closure to
-// 1e-12; the area is ½ ∮ x dy − y dx [Green]. Chords from the boundary inwards look for further
-// loops: other rims, holes. Three dimensions: areas of sections, integrated by adaptive
+// {margin_i = 0} is followed on the manifold of poses (so that folds, type 1, are regular curves)
+// to the corner where another margin vanishes, and on along that, until the loop closes. Each step
+// is a polynomial of degree 8 in its Chebyshev nodes, every node and corner a solution of the
+// closure to 1e-12; the area is ½ ∮ x dy − y dx [Green]. Chords from the boundary inwards look for
+// further loops: other rims, holes. Three dimensions: areas of sections, integrated by adaptive
 // Gauss–Kronrod rules between the lowest and the highest pose. One: the two ends of a path.
 #pragma once
 
@@ -20,7 +20,7 @@ namespace mbv {
 
 /// A piece of the boundary on one bound.
 struct TracedArc {
-  int bound = -1;                      ///< of PoseSpace::bounds()
+  int bound = -1;                       ///< of PoseSpace::bounds()
   std::vector<Eigen::Vector2d> points;  ///< of the free coordinates [m or rad]
 };
 struct TracedLoop {
@@ -37,8 +37,8 @@ struct TracedSection {
 
 struct TracedSet {
   RunSummary summary;
-  double measure = kNan, error = kNan;  ///< length, area or volume
-  std::vector<TracedSection> sections;  ///< by height; of one dimension none
+  double measure = kNan, error = kNan;       ///< length, area or volume
+  std::vector<TracedSection> sections;       ///< by height; of one dimension none
   std::vector<std::pair<double, int>> ends;  ///< of one dimension: coordinate, bound
   std::vector<SpacePose> inside;             ///< some poses that belong to it
   double low = kNan, high = kNan;            ///< of three dimensions: the third coordinate
@@ -55,6 +55,5 @@ struct TracedSet {
 /// pairs of poses on both sides of it, the first one where it is positive.
 [[nodiscard]] std::vector<TracedArc> TraceInside(
     const PoseSpace& space, int bound, const std::vector<std::pair<SpacePose, SpacePose>>& across);
-
 
 }  // namespace mbv

@@ -75,8 +75,7 @@ std::vector<std::pair<TriangleMesh, std::string>> InWorld(
   const int index = mechanism.FindOutput(output_name);
   if (index < 0) return {};
   const Output& output = mechanism.outputs[static_cast<size_t>(index)];
-  const Pose X_WR =
-      mechanism.X_WB_home[static_cast<size_t>(output.reference_body)] * output.X_RbR;
+  const Pose X_WR = mechanism.X_WB_home[static_cast<size_t>(output.reference_body)] * output.X_RbR;
   for (auto& [mesh, color] : surfaces) {
     for (Vec3& p : mesh.vertices) p = X_WR * p;
   }
@@ -172,8 +171,7 @@ int Workspace(const WorkspaceArguments& arguments) {
     return outcome.summary.stop == Stop::kUnsupported ? 2 : 3;
   }
   return WriteResults(arguments, mechanism.name, outcome.files, outcome.agree,
-                      OutcomeJson(mechanism.name, outcome.agree, outcome.measures),
-                      inputs.files());
+                      OutcomeJson(mechanism.name, outcome.agree, outcome.measures), inputs.files());
 }
 
 }  // namespace

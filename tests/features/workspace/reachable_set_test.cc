@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "analytic/scara_robot/workspace.h"
 #include "analytic/spr_tripod/workspace.h"
 #include "features/workspace/quality.h"
 #include "features/workspace/set_report.h"
@@ -152,6 +153,19 @@ TEST(ReachableSet, AFiveBarsCirclesAndSingularCurvesAreThoseOfItsClosedForm) {
   const Answer whole = Ask(five_bar, arguments);
   ExpectMeasure(whole, lens - 2 * pi * 0.01, 1e-10);
   EXPECT_EQ(whole.set.traced.sections[0].loops.size(), 3u);
+  // Inside it, the forearms lie in one line on curves.
+  const QualityMap map = MapQuality(*whole.question, whole.set, "tool", 1);
+  size_t inside = 0;
+  for (const TracedArc& arc : map.singular) {
+    for (const Eigen::Vector2d& p : arc.points) {
+      const double r1 = p.norm(), r2 = (p - Eigen::Vector2d(0.3, 0)).norm();
+      if (std::max(r1, r2) > 0.599 || std::min(r1, r2) < 0.101) continue;
+      const Eigen::Vector2d a = p - Elbow(p, 0, 1), b = p - Elbow(p, 0.3, -1);
+      EXPECT_LT(std::abs(a[0] * b[1] - a[1] * b[0]) / (0.35 * 0.35), 1e-9) << p.transpose();
+      ++inside;
+    }
+  }
+  EXPECT_GT(inside, 50u);
 
   arguments.cross_singularities = false;
   const Answer answer = Ask(five_bar, arguments);
@@ -164,8 +178,8 @@ TEST(ReachableSet, AFiveBarsCirclesAndSingularCurvesAreThoseOfItsClosedForm) {
         const SetBound::Kind kind = answer.set.bounds[static_cast<size_t>(arc.bound)].kind;
         if (kind == SetBound::Kind::kType1) {
           // Stretched or folded.
-          const double off = std::min({std::abs(r1 - 0.6), std::abs(r1 - 0.1),
-                                       std::abs(r2 - 0.6), std::abs(r2 - 0.1)});
+          const double off = std::min(
+              {std::abs(r1 - 0.6), std::abs(r1 - 0.1), std::abs(r2 - 0.6), std::abs(r2 - 0.1)});
           EXPECT_LT(off, 1e-9) << p.transpose();
           ++type1;
         } else if (std::max(r1, r2) < 0.599 && std::min(r1, r2) > 0.101) {
@@ -235,13 +249,12 @@ TEST(ReachableSet, SingularCurvesOfA3RrrAreThoseOfItsClosedForm) {
   };
   std::array<double, 3> side{};
   for (size_t i = 0; i < 3; ++i) {
-    const Pose& X_WB = robot.X_WB_home[static_cast<size_t>(
-        robot.FindBody(std::string(1, "abc"[i]) + ".fore"))];
+    const Pose& X_WB =
+        robot.X_WB_home[static_cast<size_t>(robot.FindBody(std::string(1, "abc"[i]) + ".fore"))];
     const Pose& X_WP = robot.X_WB_home[static_cast<size_t>(robot.FindBody("platform"))];
     // At home's own yaw the sign is the same.
     const Vec3 C = X_WP * Vec3(0.12 * std::cos(phi.at(i)), 0.12 * std::sin(phi.at(i)), 0);
-    const Eigen::Vector2d d = C.head<2>() - foot(i),
-                          b = X_WB.translation().head<2>() - foot(i);
+    const Eigen::Vector2d d = C.head<2>() - foot(i), b = X_WB.translation().head<2>() - foot(i);
     side.at(i) = d[0] * b[1] - d[1] * b[0] > 0 ? 1.0 : -1.0;
   }
   size_t type1 = 0, type2 = 0;
@@ -328,6 +341,40 @@ TEST(ReachableSet, TheTripodsVolumeIsThatOfItsClosedForm) {
   EXPECT_NEAR(set.measure, 0.01243676143457, 1e-6 * 0.0124);
   EXPECT_NEAR(set.low, 0.435861216, 1e-6);
   EXPECT_NEAR(set.high, 0.708854710, 1e-6);
+}
+
+// What the closed form takes for reachable ends where the traced boundary lies, to 1e-8 m.
+TEST(ReachableSet, ASectionOfTheScaraRobotIsThatOfItsClosedForm) {
+  const Mechanism robot = ShippedModel("scara_robot");
+  SetArguments arguments = Over({"x", "y"}, 40);
+  arguments.at = {"yaw_deg=45", "z=-0.165"};
+  arguments.cross_singularities = true;
+  // The model states the shear's range of two limbs, the closed form of all.
+  const double most = 0.05 * std::sin(50 * pi / 180);
+  for (const char* limb : {"limb1", "limb2"}) {
+    arguments.ranges.push_back(fmt::format("{}.cross_bar.0={:.17g}:{:.17g}", limb, -most, most));
+  }
+  const Answer answer = Ask(robot, arguments);
+  ASSERT_TRUE(answer.set.agree) << answer.diagnostics.Text() << answer.set.verdict;
+  const scara::Parameters parameters = scara::ParametersOf(robot);
+  const scara::Limits limits = scara::LimitsOf(robot);
+  const auto reached = [&](const Eigen::Vector2d& p) {
+    return scara::CheckPose(parameters, limits, {p[0], p[1], -0.165, pi / 4}).reach ==
+           scara::Reach::kReachable;
+  };
+  size_t checked = 0;
+  for (const TracedLoop& loop : answer.set.traced.sections[0].loops) {
+    for (const TracedArc& arc : loop.arcs) {
+      for (size_t k = 1; k + 1 < arc.points.size(); ++k) {
+        const Eigen::Vector2d along = (arc.points[k + 1] - arc.points[k - 1]).normalized();
+        const Eigen::Vector2d across = 1e-8 * Eigen::Vector2d(-along[1], along[0]);
+        EXPECT_NE(reached(arc.points[k] + across), reached(arc.points[k] - across))
+            << arc.points[k].transpose();
+        ++checked;
+      }
+    }
+  }
+  EXPECT_GT(checked, 100u);
 }
 
 // A flood that takes one stroke to be longer disagrees with the boundary.
@@ -477,8 +524,7 @@ motors:
     expect("speed_least", det / std::max(V.col(0).norm(), V.col(1).norm()));
     const Eigen::Matrix2d F = (J.transpose().inverse()) * Eigen::Vector2d(40, 10).asDiagonal();
     expect("force_most", std::max((F.col(0) + F.col(1)).norm(), (F.col(0) - F.col(1)).norm()));
-    expect("force_least",
-           std::abs(F.determinant()) / std::max(F.col(0).norm(), F.col(1).norm()));
+    expect("force_least", std::abs(F.determinant()) / std::max(F.col(0).norm(), F.col(1).norm()));
     // Masses in the links' ends.
     expect("mass_elbow", 0.02 + 3 * b * b);
     expect("mass_shoulder", 0.01 + 2 * a * a + 0.02 + 3 * p.head<2>().squaredNorm());

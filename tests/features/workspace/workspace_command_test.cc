@@ -1,0 +1,71 @@
+// mbverify workspace of any model, as a user types it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_program.h"
+
+namespace mbv {
+namespace {
+
+using testing::HasSubstr;
+
+class WorkspaceCommand : public testing::Test {
+ protected:
+  [[nodiscard]] ProgramResult Call(const std::string& arguments) const {
+    return mbverify("workspace " + arguments + " --out '" + mbverify.Out() + "'");
+  }
+
+  Program mbverify{testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(WorkspaceCommand, WritesPageBoundaryPosesAndNumbers) {
+  const ProgramResult result =
+      Call("rubbing_five_bar --over x_mm=-200:200,y_mm=150:500 --resolution 40 --json -");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  const auto& set = json["set"];
+  EXPECT_EQ(set["agree"], true);
+  EXPECT_EQ(set["over"][0]["low"], -0.2);
+  EXPECT_LT(std::abs(set["traced"]["value"].get<double>() - set["flooded"]["value"].get<double>()),
+            set["flooded"]["error"].get<double>());
+  EXPECT_FALSE(set["quality"].empty());
+  EXPECT_THAT(result.err, HasSubstr("AGREE"));
+  const std::filesystem::path folder = mbverify.folder() / "out/rubbing_five_bar/workspace";
+  const std::string boundary = ReadAll(folder / "reachable_boundary.csv");
+  EXPECT_THAT(boundary, HasSubstr("section,loop,arc,tool.x_m,tool.y_m,bound,kind"));
+  EXPECT_THAT(boundary, HasSubstr("box tool.x = -0.2,box"));
+  EXPECT_THAT(ReadAll(folder / "reachable_poses.csv"), HasSubstr("type2_distance"));
+  EXPECT_THAT(ReadAll(folder / "reachable.html"), HasSubstr("What ends it"));
+  EXPECT_THAT(ReadAll(folder / "quality_condition.svg"), HasSubstr("<svg"));
+}
+
+TEST_F(WorkspaceCommand, ClosedFormsStandBesideAndASurfaceIsWritten) {
+  // Of a closed form's set; a strip of it is none.
+  const ProgramResult strip =
+      Call("spr_tripod --over x_mm=-20:20,y_mm=-20:20,z_mm=560:600 --resolution 12 --no-pictures");
+  ASSERT_EQ(strip.exit_code, 0) << strip.err;
+  EXPECT_EQ(strip.out.find("closed form"), std::string::npos);
+  EXPECT_THAT(strip.out, HasSubstr("0.00006400"));  // a box
+  const std::filesystem::path folder = mbverify.folder() / "out/spr_tripod/workspace";
+  EXPECT_THAT(ReadAll(folder / "reachable.ply"), HasSubstr("property uchar red"));
+  EXPECT_GT(ReadAll(folder / "reachable.stl").size(), 84u + 50u * 100u);
+}
+
+TEST_F(WorkspaceCommand, BadInputIsRefusedWithExitCode2) {
+  for (const auto& [arguments, message] : std::vector<std::pair<std::string, std::string>>{
+           {"four_bar --over x,qq", "there is no coordinate 'qq'"},
+           {"four_bar --over x --at y=0", "'coupler.y' is no coordinate of its own at home"},
+           {"floating_loop", "has no end"},
+           {"rubbing_five_bar --resolution 90000", "takes about"},
+           {"four_bar --base crank", "robot"}}) {
+    const ProgramResult result = Call(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments << result.err;
+    EXPECT_THAT(result.err, HasSubstr(message)) << arguments;
+  }
+}
+
+}  // namespace
+}  // namespace mbv
