@@ -87,7 +87,11 @@ class Flooder {
     const auto count = set_.levels.size();
     set_.measure = set_.levels.back();
     // Of second order, but for corners: where several bounds cut a cell, a quarter of it is open.
-    set_.error = std::abs(set_.levels[count - 1] - set_.levels[count - 2]) + 0.25 * CornerCells() +
+    double change = std::abs(set_.levels[count - 1] - set_.levels[count - 2]);
+    if (count > 2) {
+      change = std::max(change, 0.5 * std::abs(set_.levels[count - 2] - set_.levels[count - 3]));
+    }
+    set_.error = change + 0.25 * CornerCells() +
                  kCutShare * SizeOfCells(CutCells(settings_.halvings).size());
     set_.corners = static_cast<long>(corners_.size());
     for (const auto& [key, corner] : corners_) set_.inside += corner.inside;

@@ -5,7 +5,8 @@
 // positive; two poses of one corner are a contradiction. Cells with corners on both sides are
 // halved some times, and so are their neighbours that a finer corner shows to be cut; the last ones
 // are divided into simplices whose edges are cut where the first margin vanishes. What lies inside
-// is summed up [Payne, Toth 1990]. The error is what the last halving changed, of second order.
+// is summed up. The error is what the last halving changed, of second order, or half of the one
+// before.
 #pragma once
 
 #include <array>

@@ -307,9 +307,8 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
   reached.Note(
       "Both ways close poses with the same code and evaluate the same margins of bounds; nothing "
       "else is common. Error of the boundary: last coefficients of its polynomials, and of three "
-      "dimensions the Gauss–Kronrod rule's; of the lattice: what the last halving changed, and a "
-      "quarter "
-      "of the cells where bounds meet.");
+      "dimensions the Gauss–Kronrod rule's; of the lattice: what the last halving changed, "
+      "or half of the one before, and a quarter of the cells where bounds meet.");
   Items notes{set.notes};
   if (set.checked + set.unchecked > 0) {
     notes.texts.push_back(fmt::format(

@@ -519,30 +519,36 @@ bool IsInside(const std::vector<TracedLoop>& loops, const Vec2& p) {
 
 bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* section,
                       std::vector<SpacePose>* inside) {
-  std::vector<std::pair<Hit, size_t>> chords;  // from where on which loop
+  const bool is_flat = !std::isfinite(section->height);
+  std::vector<Hit> chords;  // a pose of each loop
+  std::vector<std::pair<Hit, std::string>> lost;
   const auto offer = [&](const Hit& hit) {
     if (Knows(section->loops, hit)) return true;
     trouble_.clear();
     TracedLoop loop = Trace(hit);
-    if (!loop.closed) return false;
+    if (!loop.closed) {
+      lost.emplace_back(hit, trouble_);
+      return false;
+    }
     section->loops.push_back(std::move(loop));
-    chords.emplace_back(hit, section->loops.size() - 1);
+    chords.push_back(hit);
     return true;
   };
   for (const PlacedPose& seed : seeds) {
     if (IsInside(section->loops, seed.pose.at.head<2>())) continue;
     inside->push_back(seed.pose);
-    const int rays = section->loops.empty() && !std::isfinite(section->height) ? kRays : 1;
-    for (int k = 0; k < rays; ++k) {
-      const double angle = 0.3 + 2 * pi * k / rays;
+    // Of a section of a solid one ray is enough; a loop that is lost from here is not from there.
+    bool found = false;
+    for (int k = 0; k < kRays && (is_flat || !found); ++k) {
+      const double angle = 0.3 + 2 * pi * k / kRays;
       const VecX ray = Vec2(std::cos(angle) * space_.UnitOf(0), std::sin(angle) * space_.UnitOf(1));
       const auto hit = Walk(seed, ray);
-      if (!hit || !offer(*hit)) return false;
+      found = hit && offer(*hit);
     }
   }
   // Chords from points of each loop, found by rays from its first one.
   for (size_t c = 0; c < chords.size(); ++c) {
-    const Hit from = chords[c].first;
+    const Hit from = chords[c];
     const VecX in = Inwards(from.at, from.bound);
     PlacedPose near;
     double first = 1e-3;
@@ -551,7 +557,7 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
       first *= 0.1;
     }
     if (first <= 1e-9) continue;
-    const int count = std::isfinite(section->height) ? 3 : kChords;
+    const int count = is_flat ? kChords : 3;
     for (int k = 0; k < count; ++k) {
       const double angle = 0.1 + 2 * pi * k / count;
       const VecX ray = Vec2(std::cos(angle) * space_.UnitOf(0), std::sin(angle) * space_.UnitOf(1));
@@ -563,7 +569,7 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
       target.head<2>() = 0.5 * (near.pose.at.head<2>() + hit->at.pose.at.head<2>());
       if (space_.Close(near, target, &half) && half.pose.margin.minCoeff() > 0.0) {
         inside->push_back(half.pose);
-        if (!std::isfinite(section->height) && k < 4) {
+        if (is_flat && k < 4) {
           const VecX across = Vec2(-ray[1] / space_.UnitOf(1) * space_.UnitOf(0),
                                    ray[0] / space_.UnitOf(0) * space_.UnitOf(1));
           for (const double sign : {1.0, -1.0}) {
@@ -579,8 +585,14 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
     section->area += loop.area;
     section->error += loop.error;
   }
+  for (const auto& [hit, why] : lost) {
+    if (Knows(section->loops, hit)) continue;
+    trouble_ = why;
+    return false;
+  }
+  if (section->loops.empty()) return false;
   trouble_.clear();
-  return !section->loops.empty();
+  return true;
 }
 
 // Sections of a solid and their integral.
