@@ -540,5 +540,28 @@ motors:
   }
 }
 
+// det(K − ω² M) = 0 with servos of 900 and 400 N m/rad, without weight.
+TEST(Quality, AnArmsLowestFrequencyIsThatByHand) {
+  Mechanism arm = FromText(Arm());
+  arm.drives[0].stiffness = 900;
+  arm.drives[1].stiffness = 400;
+  const Answer answer = Ask(arm, Over({"x", "y"}, 40));
+  ASSERT_TRUE(answer.set.agree) << answer.set.verdict;
+  const QualityMap map = MapQuality(*answer.question, answer.set, "tip", 1);
+  const auto at = std::ranges::find(map.indices, "frequency", &QualityIndex::name);
+  ASSERT_NE(at, map.indices.end());
+  for (size_t k = 0; k < map.points.size(); k += 11) {
+    const double r2 = answer.set.flooded.lattice[map.points[k]].at.squaredNorm();
+    const double c2 = (r2 - 0.25 - 0.04) / 0.2;
+    Eigen::Matrix2d M;
+    M << 0.01 + 0.5 + 0.02 + 3 * r2, 0.02 + 3 * (0.04 + 0.1 * c2), 0.02 + 3 * (0.04 + 0.1 * c2),
+        0.02 + 3 * 0.04;
+    const Eigen::Matrix2d A = M.inverse() * Eigen::Vector2d(900, 400).asDiagonal();
+    const double half = 0.5 * A.trace();
+    const double lowest = half - std::sqrt(half * half - A.determinant());
+    EXPECT_NEAR(map.values[k][at - map.indices.begin()], std::sqrt(lowest) / (2 * pi), 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace mbv
