@@ -170,7 +170,9 @@ class QualityMapper {
     S *= back * unit.cwiseInverse().asDiagonal() / std::sqrt(static_cast<double>(points_.size()));
     const VecX rms = Eigen::JacobiSVD<MatX>(S).singularValues();
     put(rms[0] > 0.0 ? 1.0 / rms[0] : kNan);
-    put(rms[rms.size() - 1]);
+    put(Eigen::JacobiSVD<MatX>(CoordinateRates(states, T) * back * unit.cwiseInverse().asDiagonal())
+            .singularValues()
+            .minCoeff());
     // Twists with lengths by the characteristic one, drives in units of theirs.
     MatX scaled = K * unit.cwiseInverse().asDiagonal();
     scaled.topRows<3>() *= length_;
@@ -226,6 +228,18 @@ class QualityMapper {
     }
     return D;
   }
+  // Of the set's coordinates, free and held: angles by the characteristic length.
+  [[nodiscard]] MatX CoordinateRates(const BodyStates& states, const MatX& T) const {
+    MatX C(T.cols(), T.cols());
+    Eigen::Index row = 0;
+    for (const NamedCoordinate& named : space_.settings().coordinates) {
+      if (named.coordinate.kind == Coordinate::Kind::kPrescribed) continue;
+      C.row(row) = RateOf(CoordinateRow(mechanism_, named.coordinate, states), T);
+      if (!IsLength(mechanism_, named.coordinate)) C.row(row) *= length_;
+      ++row;
+    }
+    return C;
+  }
   // Of the drives at rest, beyond no load; friction at rest counts as 0.
   [[nodiscard]] VecX HoldingForces(const BodyStates& states, const MatX& T,
                                    const MatX& back) const {
@@ -259,7 +273,7 @@ class QualityMapper {
     const std::string force =
         limits_.forces ? "at the motors' torques" : "per unit force of each drive";
     Add("type2_distance", "1", "least speed of the drives by that of the output's body (type 2)");
-    Add("type1_distance", "1", "least speed of the output's body by that of the drives (type 1)");
+    Add("type1_distance", "1", "least speed of the coordinates by that of the drives (type 1)");
     Add("condition", "1",
         fmt::format("of the twist by the drives' speeds, lengths by {:.4g} m", length_), false);
     Add("manipulability", "1", "product of its singular values");

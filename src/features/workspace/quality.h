@@ -5,12 +5,14 @@
 //       its farthest corner the largest [Fukuda 2004; Krut 2004] (2)
 //   τ = Kᵀ w, |τ_i| ≤ t_i: a polytope of forces at the output's origin, the same of moments (3)
 //   V(y)² = mean of |v|² over the points where joints hold the output's body, ṁ(y) with angles
-//       by the characteristic length: type-2 distance min |ṁ|/V, type-1 distance min V/|ṁ| (4)
+//       by the characteristic length: type-2 distance min |ṁ|/V; type-1 distance min |ẋ|/|ṁ| with
+//       the set's coordinates x, angles by that length, too                                    (4)
 //   M_d = D⁻ᵀ M D⁻¹   mass matrix as the drives feel it (5) det(K_d − ω² M_d) = 0, K_d = ∂(drive
 //   forces at rest)/∂m + servos' stiffness                  (6) |τ_g + m Kᵀ g| ≤ t: the payload m
 //   at the output's origin that motors hold                    (7)
 //
-// (4) measures points of the body alone: it depends on no frame [Voglewede, Ebert-Uphoff 2005].
+// The type-2 distance measures points of the body alone: it depends on no frame [Voglewede,
+// Ebert-Uphoff 2005].
 #pragma once
 
 #include <functional>

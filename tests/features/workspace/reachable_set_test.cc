@@ -518,6 +518,10 @@ motors:
     const auto expect = [&](const std::string& name, double value) {
       EXPECT_NEAR(map.values[k][index(name)], value, 1e-8 * (1 + std::abs(value))) << name;
     };
+    const Eigen::Matrix2d S = J.transpose() * J;
+    const double half = 0.5 * S.trace();
+    expect("type1_distance",
+           std::sqrt(half - std::sqrt(half * half - S.determinant())) / answer.set.length);
     const Eigen::Matrix2d V = J * Eigen::Vector2d(3, 5).asDiagonal();
     expect("speed_most", std::max((V.col(0) + V.col(1)).norm(), (V.col(0) - V.col(1)).norm()));
     const double det = std::abs(V.determinant());
