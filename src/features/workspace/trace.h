@@ -49,7 +49,7 @@ struct TracedSet {
 /// From a home pose inside all bounds; volumes until their error is this share of them.
 [[nodiscard]] TracedSet TraceSet(const PoseSpace& space, const PlacedPose& home,
                                  const std::function<void(double)>& progress = {},
-                                 double share = 1e-9);
+                                 double share = 1e-8);
 
 /// Curves of two dimensions on which the margin of a bound vanishes, within all the others: from
 /// pairs of poses on both sides of it, the first one where it is positive.
