@@ -187,10 +187,10 @@ class Flooder {
       }
       Report(0.3 * (1.0 - 1.0 / (1.0 + 0.1 * static_cast<double>(++waves_))));
     }
-    for (const auto& [key, corner] : corners_) {
-      if (!corner.inside) continue;
+    for (const auto& known : corners_) {
+      if (!known.second.inside) continue;
       ForEachCorner([&](const Lattice& offset) {
-        Lattice cell = key;
+        Lattice cell = known.first;
         for (size_t c = 0; c < 3; ++c) cell.at(c) -= spacing * offset.at(c);
         cells_[0].insert(cell);
       });

@@ -268,6 +268,7 @@ class QuestionReader {
       if (!held_.contains(named.name)) candidates.push_back(named);
     }
     std::vector<Coordinate> coordinates;
+    coordinates.reserve(candidates.size());
     for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
     const CoordinateChoice choice =
         ChooseCoordinates(question_.mechanism, coordinates, coordinates.size());
@@ -304,6 +305,7 @@ class QuestionReader {
     const size_t preferred = candidates.size();
     for (const NamedCoordinate& named : known_) add(named);
     std::vector<Coordinate> coordinates;
+    coordinates.reserve(candidates.size());
     for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
     const CoordinateChoice choice = ChooseCoordinates(m, coordinates, preferred);
     if (choice.dofs == 0) {
@@ -520,6 +522,7 @@ std::string UnitOfMeasure(const std::vector<std::string>& units) {
   std::map<std::string, int> powers;
   for (const std::string& unit : units) ++powers[unit];
   std::vector<std::string> parts;
+  parts.reserve(powers.size());
   for (const auto& [unit, power] : powers) {
     parts.push_back(unit + (power == 2 ? "²" : power == 3 ? "³" : ""));
   }

@@ -587,8 +587,10 @@ std::vector<std::pair<TriangleMesh, std::string>> ColoredSurface(const Reachable
     meshes[of].triangles.push_back(triangle);
   }
   std::vector<std::pair<TriangleMesh, std::string>> colored;
-  for (auto& [bound, mesh] : meshes)
+  colored.reserve(meshes.size());
+  for (auto& [bound, mesh] : meshes) {
     colored.emplace_back(std::move(mesh), ColorOfBound(set, bound));
+  }
   return colored;
 }
 

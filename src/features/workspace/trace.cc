@@ -254,11 +254,12 @@ class Tracer {
   bool Curvature(const PlacedPose& at, int bound, Eigen::Matrix2d* H, Vec2* slope) const {
     constexpr double h = 1e-3;
     std::array<std::array<double, 3>, 3> f{};
-    for (int i = -1; i <= 1; ++i) {
-      for (int j = -1; j <= 1; ++j) {
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t j = 0; j < 3; ++j) {
         PlacedPose there;
-        if (!space_.Step(at, Vec2(h * i, h * j), &there)) return false;
-        f.at(static_cast<size_t>(i + 1)).at(static_cast<size_t>(j + 1)) = there.pose.margin[bound];
+        const Vec2 step(h * (static_cast<double>(i) - 1.0), h * (static_cast<double>(j) - 1.0));
+        if (!space_.Step(at, step, &there)) return false;
+        f.at(i).at(j) = there.pose.margin[bound];
       }
     }
     (*H)(0, 0) = (f[2][1] - 2 * f[1][1] + f[0][1]) / (h * h);
