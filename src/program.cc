@@ -16,8 +16,7 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddConvergeCommand,
     AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
     AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
-    AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand,
-    AddCodeCommand;
+    AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand, AddCodeCommand;
 
 namespace {
 

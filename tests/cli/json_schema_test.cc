@@ -54,6 +54,12 @@ constexpr Call kCalls[] = {
     {"log four_bar OUT/x/four_bar/turn_inverse/traces.csv --no-pictures --out OUT/x", 0},
     {"log four_bar OUT/box.obj --no-pictures --out OUT/x", 2},
     {"standin tests/mechanisms/parallel_ankle.yaml --joints ankle.0,ankle.1 --resolution 3 "
+     "--range ankle.0_deg=-2:2 --range ankle.1_deg=-2:2 --export --out OUT/y",
+     0},
+    {"code tests/mechanisms/parallel_ankle.yaml --coordinates ankle.0,ankle.1 --states 20 "
+     "--range ankle.0_deg=-2:2 --range ankle.1_deg=-2:2 --out OUT/x",
+     0},
+    {"standin tests/mechanisms/parallel_ankle.yaml --joints ankle.0,ankle.1 --resolution 3 "
      "--out OUT/x",
      0},
     {"size slider_crank/buffer", 0},

@@ -21,7 +21,7 @@ struct CodeRange {
 };
 
 struct CodeSettings {
-  std::string name = {};                    ///< before all names in C; "": of the mechanism
+  std::string name = {};               ///< before all names in C; "": of the mechanism
   std::vector<CodeRange> ranges = {};  ///< of all coordinates: with a table to start from
   size_t states = 10000;               ///< that it is judged by
   std::uint64_t seed = 1;

@@ -212,8 +212,8 @@ int Standin(const StandinArguments& arguments) {
   const Mechanism& mechanism = *loaded.mechanism;
   StandinSettings settings = arguments.settings;
   const std::vector<NamedCoordinate> known = NamedJointCoordinates(mechanism);
-  const auto ranges =
-      ReadNamedRanges(arguments.ranges, arguments.joints, [&](const std::string& name) -> std::string {
+  const auto ranges = ReadNamedRanges(
+      arguments.ranges, arguments.joints, [&](const std::string& name) -> std::string {
         const auto at = std::ranges::find(known, name, &NamedCoordinate::name);
         return at == known.end() ? "" : CoordinateUnit(mechanism, at->coordinate);
       });
