@@ -72,7 +72,9 @@ int Code(CodeArguments arguments) {
   const std::string json = arguments.json.Text(ToJson(result, mechanism.name));
   std::vector<std::pair<std::string, std::string>> files = {{"code.json", json}};
   if (settings.check.empty()) files.insert(files.begin(), result.files.begin(), result.files.end());
-  OutputFolder folder(arguments.out, mechanism.name + "/code");
+  // A header that lies in the folder of those made stays there.
+  OutputFolder folder(arguments.out,
+                      mechanism.name + (settings.check.empty() ? "/code" : "/code_check"));
   if (const std::string trouble = folder.WriteAll(files); !trouble.empty()) {
     return NotWritten(trouble, "choose another folder with --out");
   }

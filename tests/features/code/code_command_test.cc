@@ -32,7 +32,7 @@ TEST_F(CodeCommand, WritesJudgedFiles) {
   EXPECT_TRUE(json["agrees"]);
   EXPECT_EQ(json["table"]["proved"], 1.0);
   const std::filesystem::path folder = mbverify.folder() / "out/parallel_ankle/code";
-  for (const std::string& name : json["files"]) {
+  for (const std::string name : json["files"]) {
     EXPECT_GT(ReadAll(folder / name).size(), 500U) << name;
   }
   EXPECT_EQ(ReadAll(folder / "code.json"), result.out);

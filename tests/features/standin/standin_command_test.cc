@@ -187,7 +187,7 @@ TEST_F(StandinCommand, RefusesBadInputWithAHint) {
       {"--joints ankle.0", "2 drives move the 1 chosen joint"},
       {"--joints ankle.0,ankle.1,left_hinge", "depend on each other"},
       {"--joints ankle.0,ankle.1 --range ankle.0_deg=30:-50", "is empty"},
-      {"--joints ankle.0,ankle.1 --range ankle.0_deg=30", "is not JOINT=LOW:HIGH"},
+      {"--joints ankle.0,ankle.1 --range ankle.0_deg=30", "is not NAME=LOW:HIGH"},
       {"--joints ankle.0,ankle.1 --range ankle.0_deg=a:3", "two numbers are needed"},
       {"--joints ankle.0,ankle.1 --range ankle.0_mm=-3:3", "coordinate is in rad"},
       {"--joints ankle.0,ankle.1 --range ankle.0=-1:1 --range ankle.0=0:1", "stated twice"},
