@@ -264,15 +264,7 @@ class CodeMaker {
     for (const std::string& note : result_.notes) {
       head.push_back(static_cast<char>(std::toupper(note[0])) + note.substr(1) + ".");
     }
-    // Nothing in a name ends a comment or a docstring.
-    for (std::string& line : head) {
-      line = OneLine(line);
-      for (const char* end : {"*/", "\"\"\"", "\\"}) {
-        for (size_t at = line.find(end); at != std::string::npos; at = line.find(end)) {
-          line[at] = '_';
-        }
-      }
-    }
+    for (std::string& line : head) line = InComment(line);
   }
 
   void Judge(const std::string& header, const std::string& python) {

@@ -105,7 +105,7 @@ void AddCodeCommand(CLI::App* app, int* exit_code) {
   code->add_option("--check", arguments->settings.check,
                    "a header with the same functions, to be judged instead of the one made");
   code->add_option("--states", arguments->settings.states, "random states to judge by")
-      ->check(CLI::Range(10, 10000000))
+      ->check(CLI::Range(10, 1000000))
       ->capture_default_str();
   code->add_option("--seed", arguments->settings.seed, "of the states")
       ->check(WholeNumber())

@@ -40,6 +40,15 @@ void Append(const std::vector<T>& more, std::vector<T>* to) {
   to->insert(to->end(), more.begin(), more.end());
 }
 
+// Eight cells a byte.
+std::vector<int> BytesOf(const std::vector<bool>& cells) {
+  std::vector<int> bytes((cells.size() + 7) / 8, 0);
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (cells[i]) bytes[i / 8] |= 1 << (i % 8);
+  }
+  return bytes;
+}
+
 // '@' in fixed texts stands for the prefix of names.
 std::string Named(std::string text, const std::string& prefix) {
   std::string named;
@@ -719,7 +728,8 @@ static inline void @jacobian_rate(const @pose* p, const double v[], double Jd[])
 }
 )code");
     for (size_t o = 0; o < f_.outputs.size(); ++o) {
-      Line("\n/* {}: x, y, z, roll, pitch, yaw in its reference frame. */", f_.outputs[o].name);
+      Line("\n/* {}: x, y, z, roll, pitch, yaw in its reference frame. */",
+           InComment(f_.outputs[o].name));
       Line("static inline void {0}pose_{1}(const {0}pose* p, double pose[]) {{", prefix_, o);
       Line("  {}output_{}(p->x, p->t, pose);\n}}", prefix_, o);
     }
@@ -786,14 +796,6 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
     }
     return items;
   }
-  // Eight cells a byte.
-  [[nodiscard]] std::vector<int> ProvedBytes() const {
-    std::vector<int> bytes((o_.table->proved.size() + 7) / 8, 0);
-    for (size_t i = 0; i < o_.table->proved.size(); ++i) {
-      if (o_.table->proved[i]) bytes[i / 8] |= 1 << (i % 8);
-    }
-    return bytes;
-  }
 
   void CTable() {
     const StartTable& table = *o_.table;
@@ -813,7 +815,7 @@ static inline int @inverse_dynamics(const @pose* p, const double v[], const doub
     Line("  static const int nodes[] = {{{}}}, cells[] = {{{}}};", Joined(Numbers(table.nodes)),
          Joined(Numbers(table.cells)));
     Line("  static const unsigned char proved[] = {{\n{}  }};",
-         List(Numbers(ProvedBytes()), "    "));
+         List(Numbers(BytesOf(table.proved)), "    "));
     if (!searched.empty()) {
       Line("  static const double table[] = {{\n{}  }};", List(items, "    "));
       Line("  static const int searched[] = {{{}}};", Joined(Numbers(searched)));
@@ -1091,7 +1093,7 @@ def jacobian_rate(p, v):
     for (size_t o = 0; o < f_.outputs.size(); ++o) {
       Line("\n\ndef pose_{}(p):", o);
       Line("    \"\"\"{}: x, y, z, roll, pitch, yaw in its reference frame.\"\"\"",
-           f_.outputs[o].name);
+           InComment(f_.outputs[o].name));
       Line("    return _output_{}(p.x, p.t)", o);
     }
     if (!f_.forces.empty()) {
@@ -1131,7 +1133,7 @@ def inverse_dynamics(p, v, a, more=None):
     const std::vector<int> searched = Searched();
     Line("\n\n_LOW, _HIGH = [{}], [{}]", Joined(Numbers(table.low)), Joined(Numbers(table.high)));
     Line("_NODES, _CELLS = [{}], [{}]", Joined(Numbers(table.nodes)), Joined(Numbers(table.cells)));
-    Line("_PROVED = bytes([\n{}])", List(Numbers(ProvedBytes()), "    "));
+    Line("_PROVED = bytes([\n{}])", List(Numbers(BytesOf(table.proved)), "    "));
     Line("_SEARCHED = [\n{}]", List(Numbers(searched), "    "));
     Line("_TABLE = [\n{}]", List(TableItems(searched), "    "));
     Line("\n\ndef at(p, q):");
@@ -1215,6 +1217,14 @@ def self_test():
 
 }  // namespace
 
+std::string InComment(const std::string& text) {
+  std::string line = OneLine(text);
+  for (const char* end : {"*/", "/*", "\"\"\"", "\\"}) {
+    for (size_t at = line.find(end); at != std::string::npos; at = line.find(end)) line[at] = '_';
+  }
+  return line;
+}
+
 std::string CHeader(const MechanismFormulas& formulas, const CodeTextOptions& options) {
   return CodeWriter(formulas, options, false).Text();
 }
@@ -1234,7 +1244,7 @@ std::string LookupHeader(const MechanismFormulas& formulas, const LookupTable& t
   for (size_t a = 0; a < formulas.actuators.size(); ++a) {
     const auto at = static_cast<Eigen::Index>(a);
     text += fmt::format(" *   {}: {:.2g} {}; of its slopes {:.2g}\n",
-                        OneLine(formulas.actuators[a].name), table.bound[at],
+                        InComment(formulas.actuators[a].name), table.bound[at],
                         formulas.actuators[a].unit, table.slope_bound.row(at).maxCoeff());
   }
   text += fmt::format(" */\n#ifndef {0}_H\n#define {0}_H\n\n", guard);
@@ -1247,10 +1257,7 @@ std::string LookupHeader(const MechanismFormulas& formulas, const LookupTable& t
       (table.high - table.low).cwiseQuotient(VecX::NullaryExpr(n, [&](Eigen::Index k) {
         return static_cast<double>(table.nodes[static_cast<size_t>(k)] - 1);
       }));
-  std::vector<int> bytes((table.proved.size() + 7) / 8, 0);
-  for (size_t i = 0; i < table.proved.size(); ++i) {
-    if (table.proved[i]) bytes[i / 8] |= 1 << (i % 8);
-  }
+
   std::vector<std::string> values;
   for (Eigen::Index i = 0; i < table.values.rows(); ++i) {
     for (const double value : VecX(table.values.row(i).transpose()))
@@ -1259,7 +1266,8 @@ std::string LookupHeader(const MechanismFormulas& formulas, const LookupTable& t
   text += "  static const double low[] = {" + Joined(Numbers(table.low)) + "};\n";
   text += "  static const double step[] = {" + Joined(Numbers(step)) + "};\n";
   text += "  static const int nodes[] = {" + Joined(Numbers(table.nodes)) + "};\n";
-  text += "  static const unsigned char proved[] = {\n" + List(Numbers(bytes), "    ") + "  };\n";
+  text += "  static const unsigned char proved[] = {\n" +
+          List(Numbers(BytesOf(table.proved)), "    ") + "  };\n";
   text += "  static const double table[] = {\n" + List(values, "    ") + "  };\n";
   text += fmt::format(R"code(  double part[{0}];
   int first[{0}];

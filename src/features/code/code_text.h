@@ -52,6 +52,9 @@ struct CodeTextOptions {
   std::optional<StartTable> table;
 };
 
+/// A text as a part of a comment or docstring that it does not end, on one line.
+[[nodiscard]] std::string InComment(const std::string& text);
+
 /// A header without library (but math.h) and heap.
 [[nodiscard]] std::string CHeader(const MechanismFormulas& formulas,
                                   const CodeTextOptions& options);

@@ -395,6 +395,9 @@ TEST(Code, RefusesCoordinatesThatDoNotDo) {
 // Names of a model become such as C and Python have, and nothing in them ends a comment.
 TEST(Code, TakesAnyNames) {
   Mechanism mechanism = Loaded("/models/four_bar/model.yaml");
+  ASSERT_FALSE(mechanism.outputs.empty());
+  mechanism.outputs[0].name = "a */ this is no C /* \"\"\" b";
+  mechanism.drives[0].name = "*/ nor this \"\"\"";
   mechanism.name = "4-bar */";
   const CodeResult result =
       MakeCode(mechanism, TaskOf(mechanism), {.states = 20, .origin = "a */ b \"\"\" \\ c"});
