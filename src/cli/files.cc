@@ -211,6 +211,14 @@ std::optional<std::vector<NamedRange>> ReadNamedRanges(
   return ranges;
 }
 
+bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {
+  std::vector<SetValue> values;
+  if (!ReadAssignments(texts, "--set", "m_p=45000", &values)) return false;
+  const Diagnostics findings = ReadParameterOptions(values, options);
+  SayText(stderr, findings.Text());
+  return !findings.has_errors();
+}
+
 std::optional<std::string> FindModelOrRefuse(const std::string& model) {
   auto file = FindModel(model, ".");
   if (!file) (void)Refuse(fmt::format("there is no model '{}'", model), ModelHint(model, "."));

@@ -9,6 +9,7 @@
 #include "cli/files.h"
 #include "cli/terminal.h"
 #include "model_file/load_model.h"
+#include "verify/model_text.h"
 #include "verify/version.h"
 
 namespace mbv {
@@ -73,6 +74,24 @@ bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options) {
     options->assembly[text.substr(0, at)] = n;
   }
   return good;
+}
+
+std::optional<LoadResult> LoadModelOrRefuse(const std::string& model,
+                                            const std::vector<std::string>& set,
+                                            const RobotArguments& robot) {
+  const auto file = FindModelOrRefuse(model);
+  if (!file) return std::nullopt;
+  LoadOptions options;
+  if (!ReadParameters(set, &options)) return std::nullopt;
+  if (!IsRobotFile(*file) && robot.any()) {
+    (void)RefuseRobotOptions();
+    return std::nullopt;
+  }
+  if (!ReadRobotOptions(robot, &options)) return std::nullopt;
+  LoadResult loaded = LoadRobot(*file, options);
+  SayText(stderr, loaded.diagnostics.Text());
+  if (!loaded.mechanism) return std::nullopt;
+  return loaded;
 }
 
 void JsonOption::AddTo(CLI::App* command) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 namespace mbv {
 
 struct LoadOptions;  // model_file/load_model.h
+struct LoadResult;
 
 /// What a robot's file leaves open.
 struct RobotArguments {
@@ -38,6 +40,11 @@ void AddToleranceOption(CLI::App* command, double* tolerance_m);
 /// False after a message: --assembly is not CLOSURE=N, N from 1; --base with --free-base or
 /// --plant.
 [[nodiscard]] bool ReadRobotOptions(const RobotArguments& arguments, LoadOptions* options);
+/// A command's model: by name or file, with `set` parameters (PARAMETER=VALUE) and what a robot's
+/// file leaves open. Its findings are printed; empty after them where there is no mechanism.
+[[nodiscard]] std::optional<LoadResult> LoadModelOrRefuse(const std::string& model,
+                                                          const std::vector<std::string>& set,
+                                                          const RobotArguments& robot);
 
 // --json of the commands that print a result: the same for programs.
 

@@ -307,6 +307,7 @@ std::vector<Vec3> HorizontalSection(const Geometry& geometry, double z, int coun
 std::vector<AxialLimits> AxialSection(const Geometry& geometry, double azimuth,
                                       const std::vector<double>& heights) {
   std::vector<AxialLimits> limits;
+  limits.reserve(heights.size());
   for (double z : heights) {
     limits.push_back({z, -ReachAt(geometry, z, azimuth + pi), ReachAt(geometry, z, azimuth)});
   }

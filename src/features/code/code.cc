@@ -520,8 +520,9 @@ std::optional<CodeTask> ChooseCodeTask(const Mechanism& mechanism,
     task.actuators.push_back(
         {mechanism.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
   }
-  std::ranges::rotate(task.actuators,
-                      task.actuators.end() - static_cast<std::ptrdiff_t>(mechanism.drives.size()));
+  std::rotate(task.actuators.begin(),
+              task.actuators.end() - static_cast<std::ptrdiff_t>(mechanism.drives.size()),
+              task.actuators.end());
   return task;
 }
 

@@ -32,17 +32,11 @@ struct CodeArguments {
 };
 
 int Code(CodeArguments arguments) {
-  const auto file = FindModelOrRefuse(arguments.model);
-  if (!file) return 2;
-  LoadOptions options;
-  if (!ReadParameters(arguments.set, &options)) return 2;
-  if (!IsRobotFile(*file) && arguments.options.any()) return RefuseRobotOptions();
-  if (!ReadRobotOptions(arguments.options, &options)) return 2;
   const InputWatch inputs;
-  LoadResult loaded = LoadRobot(*file, options);
-  SayText(stderr, loaded.diagnostics.Text());
-  if (!loaded.mechanism) return 2;
-  const Mechanism& mechanism = *loaded.mechanism;
+  std::optional<LoadResult> loaded =
+      LoadModelOrRefuse(arguments.model, arguments.set, arguments.options);
+  if (!loaded) return 2;
+  const Mechanism& mechanism = *loaded->mechanism;
   Diagnostics found;
   const std::optional<CodeTask> task = ChooseCodeTask(mechanism, arguments.coordinates, &found);
   SayText(stderr, found.Text());

@@ -310,7 +310,7 @@ class CodeWriter {
         const TreeRate& rate = f_.rates[static_cast<size_t>(k)];
         const int parts = rate.ball < 0 ? 1 : 4;
         for (int part = 0; part < parts; ++part) {
-          moving.push_back(f_.x[static_cast<size_t>(rate.x + part)]);
+          moving.push_back(f_.x[static_cast<size_t>(rate.x) + static_cast<size_t>(part)]);
         }
       }
       const std::vector<Expr> fixed = f_.graph.FixedParts(all, moving);

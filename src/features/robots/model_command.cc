@@ -22,14 +22,6 @@
 
 namespace mbv {
 
-bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {
-  std::vector<SetValue> values;
-  if (!ReadAssignments(texts, "--set", "m_p=45000", &values)) return false;
-  const Diagnostics findings = ReadParameterOptions(values, options);
-  SayText(stderr, findings.Text());
-  return !findings.has_errors();
-}
-
 namespace {
 
 namespace fs = std::filesystem;

@@ -155,6 +155,7 @@ std::optional<StandinMotion> ScenarioMotion(const std::string& file, const Mecha
   CommandSample command;
   ReferenceSample sample;
   std::vector<double> near;
+  near.reserve(coordinates.size());
   for (const Coordinate& coordinate : coordinates) near.push_back(HomeValue(mechanism, coordinate));
   for (const double t : SampleTimes(0.0, motion.duration_s, motion.sample_s)) {
     EvaluateMotion(motion, t, &command);
@@ -198,18 +199,12 @@ bool ReadMotions(const std::vector<std::string>& motions, const std::vector<std:
 }
 
 int Standin(const StandinArguments& arguments) {
-  const auto file = FindModelOrRefuse(arguments.model);
-  if (!file) return 2;
-  LoadOptions options;
-  if (!ReadParameters(arguments.set, &options)) return 2;
-  if (!IsRobotFile(*file) && arguments.options.any()) return RefuseRobotOptions();
-  if (!ReadRobotOptions(arguments.options, &options)) return 2;
   const InputWatch inputs;
-  LoadResult loaded = LoadRobot(*file, options);
-  SayText(stderr, loaded.diagnostics.Text());
-  if (!loaded.mechanism) return 2;
-  AddMotorsOfJoints(loaded.motors_of_joints, &*loaded.mechanism);
-  const Mechanism& mechanism = *loaded.mechanism;
+  std::optional<LoadResult> loaded =
+      LoadModelOrRefuse(arguments.model, arguments.set, arguments.options);
+  if (!loaded) return 2;
+  AddMotorsOfJoints(loaded->motors_of_joints, &*loaded->mechanism);
+  const Mechanism& mechanism = *loaded->mechanism;
   StandinSettings settings = arguments.settings;
   const std::vector<NamedCoordinate> known = NamedJointCoordinates(mechanism);
   const auto ranges = ReadNamedRanges(

@@ -123,6 +123,7 @@ std::map<int, size_t> CountsOf(const StandinResult& result, const Value& value) 
 }
 std::string CountsText(const std::map<int, size_t>& counts) {
   std::vector<std::string> parts;
+  parts.reserve(counts.size());
   for (const auto& [count, poses] : counts) {
     parts.push_back(fmt::format("{} at {} pose{}", count, poses, poses == 1 ? "" : "s"));
   }

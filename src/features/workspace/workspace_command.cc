@@ -140,18 +140,12 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
 }
 
 int Workspace(const WorkspaceArguments& arguments) {
-  const auto file = FindModelOrRefuse(arguments.model);
-  if (!file) return 2;
-  LoadOptions options;
-  if (!ReadParameters(arguments.set, &options)) return 2;
-  if (!IsRobotFile(*file) && arguments.options.any()) return RefuseRobotOptions();
-  if (!ReadRobotOptions(arguments.options, &options)) return 2;
   const InputWatch inputs;
-  LoadResult loaded = LoadRobot(*file, options);
-  SayText(stderr, loaded.diagnostics.Text());
-  if (!loaded.mechanism) return 2;
-  AddMotorsOfJoints(loaded.motors_of_joints, &*loaded.mechanism);
-  const Mechanism& mechanism = *loaded.mechanism;
+  std::optional<LoadResult> loaded =
+      LoadModelOrRefuse(arguments.model, arguments.set, arguments.options);
+  if (!loaded) return 2;
+  AddMotorsOfJoints(loaded->motors_of_joints, &*loaded->mechanism);
+  const Mechanism& mechanism = *loaded->mechanism;
   ProgressLine line(true);
   ProgressFunction progress;
   if (line.active()) {
