@@ -32,6 +32,7 @@ std::vector<std::string> Numbers(const VecX& values) {
 }
 std::vector<std::string> Numbers(const std::vector<int>& values) {
   std::vector<std::string> items;
+  items.reserve(values.size());
   for (const int value : values) items.push_back(std::to_string(value));
   return items;
 }
@@ -252,6 +253,7 @@ class CodeWriter {
     const std::string sign = (python_ ? "_" : prefix_) + std::string("sign");
     const FormulaText formulas(all, sign, given, given_name);
     std::vector<std::string> parameters;
+    parameters.reserve(arguments.size() + results.size());
     for (const Argument& argument : arguments) {
       parameters.push_back(python_ ? argument.name : "const double " + argument.name + "[]");
     }
@@ -378,6 +380,7 @@ class CodeWriter {
     }
     if (python_) {
       std::vector<std::string> magnitudes;
+      magnitudes.reserve(sizes.size());
       for (const std::string& size : sizes) magnitudes.push_back("abs(" + size + ")");
       Line("    return max([");
       text_ += List(magnitudes, "        ");

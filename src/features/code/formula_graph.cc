@@ -96,7 +96,7 @@ Expr FormulaGraph::Make(FormulaOp op, Expr a, Expr b) {
   if (x.op == FormulaOp::kNumber && (unary || y.op == FormulaOp::kNumber)) {
     return Number(ValueOf(op, x.value, y.value));
   }
-  const auto negated = [this](const Node& of) { return Expr(Expr::ById(), of.a); };
+  const auto negated = [](const Node& of) { return Expr(Expr::ById(), of.a); };
   switch (op) {
     case FormulaOp::kAdd:
       if (IsZero(a)) return b;

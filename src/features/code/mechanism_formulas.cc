@@ -616,6 +616,7 @@ class FormulaMaker {
       if (!made_->graph.IsZero(row.residual)) closure.gaps.push_back(row.residual);
     }
     std::vector<Expr> rates;
+    rates.reserve(rows.size());
     for (const RowFormula& row : rows) rates.push_back(row.rate);
     std::vector<std::vector<Expr>> J(made_->rates.size());  // by column
     for (size_t k = 0; k < J.size(); ++k) J[k] = Coefficients(rates, k);
@@ -656,6 +657,7 @@ class FormulaMaker {
     const auto m = static_cast<Eigen::Index>(rows.size());
     const auto n = static_cast<Eigen::Index>(J.size());
     std::vector<Expr> all;
+    all.reserve(rows.size() * (J.size() + 1) + closure->values.size());
     for (const RowFormula& row : rows) all.push_back(row.residual);
     for (const auto& column : J) all.insert(all.end(), column.begin(), column.end());
     all.insert(all.end(), closure->values.begin(), closure->values.end());
