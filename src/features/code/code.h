@@ -41,14 +41,14 @@ struct CodeJudgement {
   double position = kNan;       ///< largest difference, by the largest value of its actuator
   double force = kNan;          ///< of actuators; NaN: there are none
   double along = kNan;          ///< of forces along the coordinates
-  double output = kNan;         ///< of the outputs' poses [m, rad], as they are
+  double output = kNan;         ///< of the outputs' poses [characteristic lengths, rad]
   double back = kNan;           ///< share of the states that the way by actuators leads back to
   double jacobian = kNan;       ///< by the largest entry
   double nanoseconds = kNan;    ///< per state: pose, Jacobian and forces
   std::string slip = {};        ///< what is wrong, where that is found out
   std::vector<std::string> warnings = {};  ///< of the compiler
 
-  /// Limit of all three differences.
+  /// Limit of all differences.
   static constexpr double kLimit = 1e-9;
   [[nodiscard]] bool agrees() const;
 };

@@ -34,6 +34,19 @@ VecX Chosen(const Mechanism& mechanism, const std::vector<NamedCoordinate>& actu
   return chosen;
 }
 
+// Runs a program in a folder; why it did not end well, or "". What it wrote is in `log` there.
+std::string Ended(const std::vector<std::string>& argv, const std::filesystem::path& folder) {
+  WorkerEnd end;
+  WorkerPool pool;
+  pool.ended = [&](size_t /*job*/, const WorkerEnd& ended) { end = ended; };
+  if (!pool.Run({{.argv = argv, .log = folder / "log", .folder = folder}})) return "interrupted";
+  if (!end.trouble.empty()) return end.trouble;
+  if (end.timed_out) return "took longer than " + TimeText(pool.timeout_s);
+  if (end.signal != 0) return fmt::format("was ended by signal {}", end.signal);
+  if (end.exit_code != 0) return fmt::format("ended with code {}", end.exit_code);
+  return "";
+}
+
 std::vector<Coordinate> AllOf(const CodeTask& task) {
   std::vector<Coordinate> all;
   for (const auto* named : {&task.coordinates, &task.held}) {
@@ -80,8 +93,8 @@ bool CodeReference::Find(TestState* state, std::string* why) {
   for (Eigen::Index o = 0; o < outputs.rows(); ++o) {
     state->outputs.segment<6>(6 * o) = outputs.row(o).transpose();
   }
+  MatX T;
   const auto along = [&](ReducedModel* model, VecX* forces) {
-    MatX T;
     if (model != &model_) {
       model->Restart();
       summary = model->Move(q, v, a);
@@ -91,8 +104,8 @@ bool CodeReference::Find(TestState* state, std::string* why) {
     return !failed();
   };
   state->more = VecX::Zero(n);
-  if (!along(own_ ? &*own_ : &model_, &state->along)) return false;
   if (given_ && !along(&*given_, &state->more)) return false;
+  if (!along(own_ ? &*own_ : &model_, &state->along)) return false;
   if (task_.actuators.size() != task_.coordinates.size()) return true;
   summary = model_.AllForces({});
   if (summary.ok() && !given_) {
@@ -102,9 +115,8 @@ bool CodeReference::Find(TestState* state, std::string* why) {
     return true;
   }
   // What is held needs forces that no actuator gives: those along the coordinates alone.
-  MatX T;
-  summary = model_.Motions(&T);
-  if (failed()) return false;
+  if (own_) summary = model_.Motions(&T);
+  if (own_ && failed()) return false;
   const MatX rates = model_.DriveRates(T);
   MatX J(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -258,13 +270,9 @@ std::string CodeCheck::Run(const std::vector<std::string>& argv,
   const size_t open = std::min(open_.size(), count);
   for (size_t i = 0; i < open; ++i) add(open_[i]);
   if (!WriteFile(folder / "states", bytes).empty()) return "temporary files cannot be written";
-  WorkerEnd end;
-  WorkerPool pool;
-  pool.ended = [&](size_t /*job*/, const WorkerEnd& ended) { end = ended; };
-  if (!pool.Run({{.argv = argv, .log = folder / "log", .folder = folder}})) return "interrupted";
+  const std::string trouble = Ended(argv, folder);
   const std::string log = ReadWholeFile(folder / "log").value_or("");
-  if (!end.trouble.empty()) return end.trouble;
-  if (end.exit_code != 0) return fmt::format("ended with code {}: {}", end.exit_code, log);
+  if (!trouble.empty()) return log.empty() ? trouble : trouble + ": " + log;
   const std::optional<std::string> values = ReadWholeFile(folder / "values");
   const auto m = static_cast<Eigen::Index>(formulas_.actuators.size());
   const auto n = static_cast<Eigen::Index>(formulas_.size());
@@ -303,13 +311,6 @@ CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
     judgement.not_judged = "temporary files cannot be written";
     return judgement;
   }
-  WorkerEnd end;
-  WorkerPool pool;
-  pool.ended = [&](size_t /*job*/, const WorkerEnd& ended) { end = ended; };
-  const auto run = [&](std::vector<std::string> argv) {
-    argv.insert(argv.begin(), *compiler);
-    return pool.Run({{.argv = std::move(argv), .log = at / "log", .folder = at}});
-  };
   const auto lines = [&] {
     std::vector<std::string> all;
     const std::string log = ReadWholeFile(at / "log").value_or("");
@@ -320,15 +321,15 @@ CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
     }
     return all;
   };
-  if (run({"--version"}) && !lines().empty()) judgement.compiler = lines().front();
-  if (!run({"-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "test.c", "-o",
-            "test", "-lm"})) {
-    judgement.not_judged = "interrupted";
-    return judgement;
+  if (Ended({*compiler, "--version"}, at).empty() && !lines().empty()) {
+    judgement.compiler = lines().front();
   }
+  const std::string trouble = Ended({*compiler, "-std=c99", "-O2", "-Wall", "-Wextra",
+                                     "-Wconversion", "-pedantic", "test.c", "-o", "test", "-lm"},
+                                    at);
   judgement.warnings = lines();
-  if (end.exit_code != 0) {
-    judgement.not_judged = "it does not compile";
+  if (!trouble.empty()) {
+    judgement.not_judged = "it does not compile: the compiler " + trouble;
     judgement.broken = true;
     return judgement;
   }
@@ -336,11 +337,9 @@ CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
   if (from_table) argv.emplace_back("table");
   judgement.not_judged = Run(argv, at, states_.size(), &judgement);
   judgement.broken = !judgement.not_judged.empty();
-  if (!judgement.broken) Compare(&judgement);
-  if (from_table) {
-    // What lies outside of the proved cells is said by their share, not by states.
-    judgement.only_one = 0;
-  }
+  if (judgement.broken) return judgement;
+  // What lies outside of the proved cells is said by their share, not by states.
+  Compare(&judgement, /*may_refuse=*/from_table);
   return judgement;
 }
 
@@ -395,11 +394,11 @@ print((time.perf_counter() - began) / max(1, count))
   judgement.not_judged =
       Run({*python, "run.py"}, folder.path(), std::min(most, states_.size()), &judgement);
   judgement.broken = !judgement.not_judged.empty();
-  if (!judgement.broken) Compare(&judgement);
+  if (!judgement.broken) Compare(&judgement, /*may_refuse=*/false);
   return judgement;
 }
 
-void CodeCheck::Compare(CodeJudgement* judgement) const {
+void CodeCheck::Compare(CodeJudgement* judgement, bool may_refuse) const {
   // Positions, rates, accelerations and forces of actuators, forces along coordinates.
   constexpr size_t kParts = 5;
   const auto parts_of = [](const auto& of) {
@@ -412,7 +411,7 @@ void CodeCheck::Compare(CodeJudgement* judgement) const {
   for (size_t i = 0; i < found_.size(); ++i) {
     const Found& found = found_[i];
     if (i >= compared_ || !found.reached) {
-      judgement->only_one += found.reached || i < compared_ ? 1 : 0;
+      judgement->only_one += found.reached || (i < compared_ && !may_refuse) ? 1 : 0;
       continue;
     }
     ++judgement->states;
@@ -427,7 +426,7 @@ void CodeCheck::Compare(CodeJudgement* judgement) const {
     }
     for (Eigen::Index k = 0; k < state.outputs.size(); ++k) {
       double off = found.outputs[k] - state.outputs[k];
-      if (k % 6 > 2) off = std::remainder(off, 2.0 * M_PI);
+      off = k % 6 > 2 ? std::remainder(off, 2.0 * M_PI) : off / formulas_.length;
       if (!(std::abs(off) <= output)) output = std::abs(off);
     }
     back += found.back <= CodeJudgement::kLimit ? 1 : 0;
@@ -518,6 +517,7 @@ std::string CodeCheck::Slip(CodeReference* reference) const {
   for (Eigen::Index k = 0; k < m; ++k) {
     positions_right = positions_right && close(series(false, true, k), series(false, false, k));
   }
+  if (positions_right && states_[both[0]].forces.size() != m) return "";
   std::string slip = of_outputs(positions_right);
   if (positions_right) return slip;
   // On a symmetric mechanism a slip of the coordinates looks like one of the actuators.

@@ -58,7 +58,8 @@ class CodeCheck {
   [[nodiscard]] std::string Run(const std::vector<std::string>& argv,
                                 const std::filesystem::path& folder, size_t count,
                                 CodeJudgement* judgement);
-  void Compare(CodeJudgement* judgement) const;
+  /// `may_refuse`: the code need not reach all states.
+  void Compare(CodeJudgement* judgement, bool may_refuse) const;
   [[nodiscard]] bool ClosesOtherwise(const VecX& q, const VecX& actuators) const;
 
   const MechanismFormulas& formulas_;

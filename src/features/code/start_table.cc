@@ -199,6 +199,33 @@ struct Grid {
   }
 };
 
+// Rows of `values` at the corners of the cell from node `first` on, multilinear at q; and slopes.
+VecX Multilinear(const Grid& grid, const MatX& values, const std::vector<int>& first, const VecX& q,
+                 MatX* slopes) {
+  const Eigen::Index n = q.size();
+  const VecX part = (q - grid.Point(first)).cwiseQuotient(grid.step);
+  VecX sum = VecX::Zero(values.cols());
+  slopes->setZero(values.cols(), n);
+  for (int corner = 0; corner < (1 << n); ++corner) {
+    std::vector<int> at = first;
+    VecX weight(n), sign(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const int upper = (corner >> k) & 1;
+      at[static_cast<size_t>(k)] += upper;
+      weight[k] = upper != 0 ? part[k] : 1.0 - part[k];
+      sign[k] = upper != 0 ? 1.0 : -1.0;
+    }
+    const VecX node = values.row(grid.Index(at)).transpose();
+    sum += weight.prod() * node;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      double slope = sign[k] / grid.step[k];
+      for (Eigen::Index j = 0; j < n; ++j) slope *= j == k ? 1.0 : weight[j];
+      slopes->col(k) += slope * node;
+    }
+  }
+  return sum;
+}
+
 // x at the nodes that are reached from home, from node to node; empty where not.
 std::vector<std::optional<VecX>> PosesAt(const MechanismFormulas& f, PoseFinder* finder,
                                          const Grid& grid) {
@@ -792,36 +819,13 @@ class TableMaker {
   // x between the nodes around `inside`, and its slopes, at q.
   VecX Interpolate(const VecX& inside, const VecX& q, MatX* slopes) const {
     const Grid grid(table_.nodes, low_, high_);
-    const size_t n = f_.size();
-    std::vector<int> first(n);
-    VecX part(static_cast<Eigen::Index>(n));
-    for (size_t k = 0; k < n; ++k) {
-      const auto at = static_cast<Eigen::Index>(k);
-      const double t = (inside[at] - low_[at]) / grid.step[at];
-      first[k] = std::clamp(static_cast<int>(t), 0, table_.nodes[k] - 2);
-      part[at] = (q[at] - low_[at]) / grid.step[at] - first[k];
+    std::vector<int> first;
+    first.reserve(f_.size());
+    for (Eigen::Index k = 0; k < q.size(); ++k) {
+      const double t = (inside[k] - low_[k]) / grid.step[k];
+      first.push_back(std::clamp(static_cast<int>(t), 0, grid.counts[static_cast<size_t>(k)] - 2));
     }
-    VecX x = VecX::Zero(table_.x.cols());
-    *slopes = MatX::Zero(table_.x.cols(), static_cast<Eigen::Index>(n));
-    for (int corner = 0; corner < (1 << n); ++corner) {
-      std::vector<int> at = first;
-      for (size_t k = 0; k < n; ++k) at[k] += (corner >> k) & 1;
-      const VecX node = table_.x.row(grid.Index(at)).transpose();
-      const auto weight = [&](size_t k) {
-        const double p = part[static_cast<Eigen::Index>(k)];
-        return ((corner >> k) & 1) != 0 ? p : 1.0 - p;
-      };
-      double all = 1.0;
-      for (size_t k = 0; k < n; ++k) all *= weight(k);
-      x += all * node;
-      for (size_t k = 0; k < n; ++k) {
-        double slope = ((corner >> k) & 1) != 0 ? 1.0 : -1.0;
-        for (size_t j = 0; j < n; ++j) slope *= j == k ? 1.0 : weight(j);
-        slopes->col(static_cast<Eigen::Index>(k)) +=
-            slope / grid.step[static_cast<Eigen::Index>(k)] * node;
-      }
-    }
-    return x;
+    return Multilinear(grid, table_.x, first, q, slopes);
   }
 
   std::optional<ProvedCell> Prove(const VecX& low, const VecX& high) {
@@ -1044,37 +1048,18 @@ LookupTable MakeLookupTable(const MechanismFormulas& formulas, const StartTable&
 
 bool LookupTable::At(const VecX& q, VecX* m, MatX* slopes) const {
   const Grid grid(nodes, low, high);
-  const Eigen::Index n = q.size();
-  std::vector<int> first(nodes.size());
-  VecX part(n);
-  int cell = 0;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const auto at = static_cast<size_t>(k);
+  std::vector<int> first;
+  first.reserve(nodes.size());
+  size_t cell = 0;
+  for (Eigen::Index k = 0; k < q.size(); ++k) {
+    const int last = nodes[static_cast<size_t>(k)] - 1;
     const double t = (q[k] - low[k]) / grid.step[k];
-    if (!(t >= 0.0 && t <= nodes[at] - 1)) return false;
-    first[at] = std::min(static_cast<int>(t), nodes[at] - 2);
-    part[k] = t - first[at];
-    cell = cell * (nodes[at] - 1) + first[at];
+    if (!(t >= 0.0 && t <= last)) return false;
+    first.push_back(std::min(static_cast<int>(t), last - 1));
+    cell = cell * static_cast<size_t>(last) + static_cast<size_t>(first.back());
   }
-  if (!proved[static_cast<size_t>(cell)]) return false;
-  m->setZero(values.cols());
-  slopes->setZero(values.cols(), n);
-  for (int corner = 0; corner < (1 << n); ++corner) {
-    std::vector<int> at = first;
-    VecX weight(n);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const int upper = (corner >> k) & 1;
-      at[static_cast<size_t>(k)] += upper;
-      weight[k] = upper != 0 ? part[k] : 1.0 - part[k];
-    }
-    const VecX node = values.row(grid.Index(at)).transpose();
-    *m += weight.prod() * node;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      double slope = ((corner >> k) & 1) != 0 ? 1.0 : -1.0;
-      for (Eigen::Index j = 0; j < n; ++j) slope *= j == k ? 1.0 : weight[j];
-      slopes->col(k) += slope / grid.step[k] * node;
-    }
-  }
+  if (!proved[cell]) return false;
+  *m = Multilinear(grid, values, first, q, slopes);
   return true;
 }
 

@@ -75,24 +75,17 @@ int Model(const ModelArguments& arguments) {
   if (!arguments.drives.empty() && FormatOf(arguments.format) != ModelFormat::kMjcf) {
     return Refuse("--drives says what holds the drives of an MJCF", "add --format mjcf");
   }
-  LoadOptions options;
-  if (!ReadParameters(arguments.set, &options)) return 2;
-  if (!ReadRobotOptions(arguments.robot, &options)) return 2;
-  const auto file = FindModelOrRefuse(arguments.model);
-  if (!file) return 2;
-  if (arguments.robot.any() && !IsRobotFile(*file)) {
-    return RefuseRobotOptions();
-  }
   const InputWatch inputs;
-  const LoadResult loaded = LoadRobot(*file, options);
-  SayText(stderr, loaded.diagnostics.Text());
-  if (!loaded.mechanism) return 2;
+  const std::optional<LoadResult> read =
+      LoadModelOrRefuse(arguments.model, arguments.set, arguments.robot);
+  if (!read) return 2;
+  const LoadResult& loaded = *read;
   const ModelFormat format = FormatOf(arguments.format);
   if ((format == ModelFormat::kUrdf || format == ModelFormat::kYaml) &&
       !loaded.mechanism->beams.empty()) {
     Finding finding;
     finding.severity = Severity::kWarning;
-    finding.file = *file;
+    finding.file = loaded.mechanism->file;
     finding.message = fmt::format("{} has rigid links only: {} beams are left out",
                                   format == ModelFormat::kUrdf ? "URDF" : "what is written",
                                   loaded.mechanism->beams.size());

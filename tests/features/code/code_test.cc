@@ -207,6 +207,19 @@ TEST_F(CodeOfAnkle, TableEndsWhereTheRodsDo) {
   EXPECT_GT(result.table_share, 0.3);
   EXPECT_LT(result.table_share, 0.95);
   EXPECT_TRUE(result.judgements[1].agrees()) << Described(result);
+  EXPECT_EQ(result.judgements[1].only_one, 0U) << Described(result);
+  // With all cells marked as proved it serves what nothing reaches.
+  std::string all = FileOf(result, "parallel_ankle.h");
+  const size_t from = all.find("{", all.find("proved[] = ")), to = all.find("}", from);
+  std::string bytes;
+  for (int k = 0; k < 64 * 64 / 8; ++k) bytes += (k > 0 ? ", " : "") + std::string("255");
+  all.replace(from + 1, to - from - 1, bytes);
+  const std::filesystem::path file = place_.folder() / "all.h";
+  ASSERT_EQ(WriteFile(file, all), "");
+  const CodeResult wrong = Make({.ranges = wide, .states = 2000, .check = file.string()});
+  ASSERT_EQ(wrong.judgements.size(), 2U) << Described(wrong);
+  EXPECT_TRUE(wrong.judgements[0].agrees()) << Described(wrong);
+  EXPECT_FALSE(wrong.judgements[1].agrees()) << Described(wrong);
 }
 
 TEST_F(CodeOfAnkle, LooksUpWithinTheBound) {
