@@ -23,11 +23,12 @@
 
 #include "features/standin/standin.h"
 #include "mechanism/joint_pose.h"
+#include "mechanism/reach.h"
 
 namespace mbv {
 namespace {
 
-constexpr double kSamePoint = 1e-9;  // [m]: joints of a body there meet in a point
+constexpr double kSamePoint = 1e-9;  // [characteristic lengths]: joints that near meet in a point
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr int kSteps = 720;  // of a turn
 
@@ -123,7 +124,8 @@ struct StandinBranches::Impl {
       const Vec3 p = PointOf(not_this);
       if (!begun) {
         *first = p;
-      } else if (const double length = (p - at).norm(); length > kSamePoint) {
+      } else if (const double length = (p - at).norm();
+                 length > kSamePoint * CharacteristicLength(mechanism)) {
         if (!with_rod || end.rod > 0.0) return std::nullopt;
         end.rod = length;
       }

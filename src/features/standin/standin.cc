@@ -21,7 +21,8 @@ namespace {
 constexpr double kHalfRange = std::numbers::pi / 6.0;  // where neither user nor joint states one
 constexpr double kMostPoses = 200000.0;
 constexpr int kSamples = 400;    // of a period
-constexpr double kShort = 1e-3;  // [rad or m] of a dead centre, where the reference may stop
+constexpr double kShort = 1e-3;  // [rad, or of the range] before a dead centre, where the
+                                 // reference may stop
 constexpr size_t kCounted = 11;  // poses along a joint whose drives' joint poses are counted
 // Singular values below this share of the largest, there or at home, are round-off.
 constexpr double kRegular = 1e-9;
@@ -605,7 +606,8 @@ class StandinComputer {
     end.at = place(good);
     if (end.kind != Kind::kOpen) return end;
     // The reference stops short of a dead centre, which limbs have in closed form.
-    double reach = good, out = good + kShort;
+    double reach = good,
+           out = good + (result_.joint_units[At(joint)] == "rad" ? kShort : kShort * most);
     for (int k = 0; k < 30; ++k) {
       const double middle = 0.5 * (reach + out);
       q[joint] = place(middle);

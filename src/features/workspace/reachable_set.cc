@@ -23,6 +23,7 @@ using std::numbers::pi;
 constexpr size_t kMostNamed = 8;         // names in a message
 constexpr double kSingularHome = 1e-10;  // determinants of orthonormal motions below it are zero
 constexpr size_t kMostChecked = 24;
+constexpr double kSamePose = 1e-8;  // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 
 // "leg1_mm=500:750" → name, SI values.
@@ -456,7 +457,8 @@ void CheckByReference(const SetQuestion& question, const PoseSpace& space, Reach
     const auto compare = [&](const Coordinate& coordinate) {
       const double other = CoordinateRow(m, coordinate, model.states()).value;
       const double off = CoordinateRow(m, coordinate, states, other).value - other;
-      result->checked_off = std::max(result->checked_off, std::abs(off));
+      const double unit = IsLength(m, coordinate) ? space.length() : 1.0;
+      result->checked_off = std::max(result->checked_off, std::abs(off) / unit);
     };
     for (size_t d = 0; d < m.drives.size(); ++d) {
       compare({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
@@ -545,13 +547,16 @@ void JudgeSet(ReachableSet* result) {
   result->summary = RunSummary::Done();
   const double off = std::abs(traced.measure - flooded.measure);
   const double error = traced.error + flooded.error;
-  result->agree = off <= error && flooded.conflicts == 0 && result->checked_off < 1e-8;
+  result->agree = off <= error && flooded.conflicts == 0 && result->checked > 0 &&
+                  result->checked_off < kSamePose;
   result->verdict =
       flooded.conflicts > 0
           ? fmt::format("{} poses of the lattice are reached in two ways", flooded.conflicts)
-      : result->checked_off >= 1e-8
-          ? fmt::format("the reference closes a pose elsewhere: {:.2g} m or rad off",
-                        result->checked_off)
+      : result->checked == 0 ? "the reference reaches none of the poses inside"
+      : result->checked_off >= kSamePose
+          ? fmt::format(
+                "the reference closes a pose elsewhere: {:.2g} rad or characteristic lengths off",
+                result->checked_off)
           : fmt::format("the two ways differ by {:.2g} {}, their errors are {:.2g} together", off,
                         result->unit, error);
 }

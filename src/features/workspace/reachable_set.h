@@ -70,7 +70,8 @@ struct ReachableSet {
   std::string unit;          ///< of the measure: "m³"
   std::string measure;       ///< "volume"
   size_t checked = 0;        ///< poses that the reference closed anew
-  double checked_off = 0.0;  ///< largest difference of drives and outputs there [m or rad]
+  double checked_off = 0.0;  ///< largest difference of drives and outputs there
+                             ///< [rad, characteristic lengths]
   size_t unchecked = 0;      ///< that it did not close
   RunSummary summary;
   Diagnostics diagnostics;

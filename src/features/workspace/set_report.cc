@@ -313,7 +313,7 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
   if (set.checked + set.unchecked > 0) {
     notes.texts.push_back(fmt::format(
         "{} poses inside were closed anew by the reference from home: drives and outputs differ by "
-        "{:.1e} (m or rad) at most{}",
+        "{:.1e} (rad, or characteristic lengths) at most{}",
         set.checked, set.checked_off,
         set.unchecked > 0 ? fmt::format("; {} were not, its straight way is barred", set.unchecked)
                           : ""));

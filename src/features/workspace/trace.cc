@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -708,34 +709,25 @@ class SolidTracer {
     return area;
   }
 
-  // Gauss–Kronrod 7, 15 [QUADPACK 1983].
+  // Gauss–Kronrod 7, 15, its error as QUADPACK has it [Piessens et al. 1983].
   struct Part {
     double a, b, value, error;
   };
   Part Rule(double a, double b) {
-    static constexpr std::array<double, 8> kNode = {
-        0.991455371120812639206854697526329, 0.949107912342758524526189684047851,
-        0.864864423359769072789712788640926, 0.741531185599394439863864773280788,
-        0.586087235467691130294144691693555, 0.405845151377397166906606412076961,
-        0.207784955007898467600689403773245, 0.0};
-    static constexpr std::array<double, 8> kWeight = {
-        0.022935322010529224963732008058970, 0.063092092629978553290700663189204,
-        0.104790010322250183839876322541518, 0.140653259715525918745189590510238,
-        0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
-        0.204432940075298892414161999234649, 0.209482141084727828012999174891714};
-    static constexpr std::array<double, 4> kGauss = {
-        0.129484966168869693270611432679082, 0.279705391489276667901467771423780,
-        0.381830050505118944950369775488975, 0.417959183673469387755102040816327};
+    using Kronrod = boost::math::quadrature::gauss_kronrod<double, 15>;
+    using Gauss = boost::math::quadrature::gauss<double, 7>;
     const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
     double kronrod = 0.0, gauss = 0.0, spread = 0.0;
     std::vector<std::pair<double, double>> values;
-    for (size_t k = 0; k < 8; ++k) {
+    // From the middle on; every other node is Gauss's.
+    for (size_t k = 0; k < Kronrod::abscissa().size(); ++k) {
+      const double weight = Kronrod::weights()[k];
       for (const double sign : {-1.0, 1.0}) {
-        if (k == 7 && sign > 0.0) continue;
-        const double y = AreaAt(middle + sign * half * kNode.at(k));
-        values.emplace_back(kWeight.at(k), y);
-        kronrod += kWeight.at(k) * y;
-        if (k % 2 == 1) gauss += kGauss.at(k / 2) * y;
+        if (k == 0 && sign > 0.0) continue;
+        const double y = AreaAt(middle + sign * half * Kronrod::abscissa()[k]);
+        values.emplace_back(weight, y);
+        kronrod += weight * y;
+        if (k % 2 == 0) gauss += Gauss::weights()[k / 2] * y;
       }
     }
     for (const auto& [weight, y] : values) spread += weight * std::abs(y - 0.5 * kronrod);
