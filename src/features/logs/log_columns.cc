@@ -1,5 +1,4 @@
 #include "features/logs/log_columns.h"
-#include "mechanism/reach.h"
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include <set>
 
 #include "base/text.h"
+#include "mechanism/reach.h"
 #include "scenario/tables/units.h"
 
 namespace mbv {

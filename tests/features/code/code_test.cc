@@ -378,6 +378,55 @@ print(worst)
   EXPECT_LT(std::strtod(done.out.c_str(), nullptr), 1e-8);
 }
 
+// A plate on a ball that three legs turn: the ball damps, has an armature and dry friction.
+std::string Plate(double damping) {
+  return R"(<mujoco model="plate"><worldbody>
+<body name="table"><joint name="turn" axis="0 0.6 0.8"/>
+<inertial pos="0 0.1 0" mass="2" diaginertia="0.1 0.1 0.1"/>
+<site name="a0" pos="0.4 0 0.1"/><site name="a1" pos="-0.2 0.35 0.1"/>
+<site name="a2" pos="-0.2 -0.35 0.1"/>
+<body name="plate" pos="0.05 0 0.5" euler="6 -11 17">
+<joint type="ball" pos="0.02 0.01 -0.1" armature="0.05" frictionloss="0.2" damping=")" +
+         fmt::format("{}", damping) + R"("/>
+<inertial pos="0.02 -0.03 0.05" mass="1.5" diaginertia="0.03 0.02 0.04"/>
+<site name="b0" pos="0.1 0.28 0"/><site name="b1" pos="-0.3 -0.05 0"/>
+<site name="b2" pos="0.19 -0.23 0"/></body></body></worldbody><tendon>
+<spatial name="leg0"><site site="a0"/><site site="b0"/></spatial>
+<spatial name="leg1"><site site="a1"/><site site="b1"/></spatial>
+<spatial name="leg2"><site site="a2"/><site site="b2"/></spatial></tendon>
+<actuator><motor name="turn" joint="turn"/><motor name="leg0" tendon="leg0"/>
+<motor name="leg1" tendon="leg1"/><motor name="leg2" tendon="leg2"/></actuator></mujoco>
+)";
+}
+
+TEST(Code, TakesWhatActsOnBalls) {
+  const Program place("balls");
+  const auto loaded = [&](double damping) {
+    const std::filesystem::path file = place.folder() / "plate.xml";
+    EXPECT_EQ(WriteFile(file, Plate(damping)), "");
+    LoadResult result = LoadRobot(file.string(), {});
+    EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
+    return result.mechanism.value_or(Mechanism());
+  };
+  const Mechanism mechanism = loaded(0.3);
+  ASSERT_GE(mechanism.elements.size(), 9U);
+  const CodeResult result = MakeCode(mechanism, TaskOf(mechanism), {.states = 100});
+  ASSERT_EQ(result.judgements.size(), 2U) << Described(result);
+  EXPECT_TRUE(result.agrees()) << Described(result);
+  for (const CodeJudgement& judgement : result.judgements) {
+    EXPECT_LT(judgement.force, 1e-10) << Described(result);
+  }
+  const std::filesystem::path header = place.folder() / "plate.h";
+  ASSERT_EQ(WriteFile(header, FileOf(result, result.name + ".h")), "");
+  const Mechanism other = loaded(0.3 * (1.0 + 1e-6));
+  const CodeResult differs =
+      MakeCode(other, TaskOf(other), {.states = 100, .check = header.string()});
+  ASSERT_EQ(differs.judgements.size(), 1U) << Described(differs);
+  EXPECT_LT(differs.judgements[0].position, 1e-10);
+  EXPECT_GT(differs.judgements[0].force, CodeJudgement::kLimit);
+  EXPECT_FALSE(differs.agrees());
+}
+
 // What formulas cannot say is refused or said.
 TEST(Code, SaysWhatItHasNot) {
   const Mechanism redundant = Loaded("/models/redundant_five_bar/model.yaml");
