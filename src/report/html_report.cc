@@ -279,6 +279,7 @@ class PageWriter {
     if (report_.source_model != nullptr) {
       page_.Add(SourceModelSection(*report_.source_model, false));
     }
+    for (const ReportPart& part : report_.parts) page_.Add(part.section);
     page_.Add("Energy", "Energy", EnergyHtml(report_));
     page_.Add("What could not be compared", "Gaps", GapsHtml(view_, true));
     page_.Add("The paper's equations", "Equations", AuditHtml(input_.audit));

@@ -254,6 +254,9 @@ std::string ToJson(const Report& report) {
   if (!report.tables.empty()) json["motion_tables"] = MotionTableJson(report);
   if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
   if (report.source_model != nullptr) json["source_model"] = SourceModelJson(*report.source_model);
+  for (const ReportPart& part : report.parts) {
+    json[part.key] = ParseJson<nlohmann::ordered_json>(part.json);
+  }
   json["loads"] = LoadsJson(report);
   if (!report.motors.empty()) json["motors"] = SizingJson(report);
   if (!report.contact_loads.empty()) json["contacts"] = ContactsJson(report);

@@ -40,6 +40,7 @@ class VerdictTableWriter {
     if (report.source_model != nullptr) {
       out_.Add(SourceModelSection(*report.source_model, out_.verbose()));
     }
+    for (const ReportPart& part : report.parts) out_.Add(part.section);
     Energy(report.comparison);
     Tail(report);
     if (out_.verbose()) {

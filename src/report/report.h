@@ -16,6 +16,7 @@
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "report/document.h"
 #include "report/result.h"
 
 namespace mbv {
@@ -71,6 +72,13 @@ struct SmoothedForce {
   double change_rms = kNan, change_max = kNan;  ///< against the motion through all rows
 };
 
+/// What a product adds to a run.
+struct ReportPart {
+  std::string key;  ///< in summary.json
+  ReportSection section;
+  std::string json;
+};
+
 /// Of a motion.
 struct Report : ResultFrame {
   std::vector<std::string> drives;   ///< model order
@@ -96,7 +104,8 @@ struct Report : ResultFrame {
   std::vector<MotorLoad> motor_loads;          ///< by witness that ran, then by motor
   std::optional<EngineComparison> engine_comparison;
   std::shared_ptr<const SourceModelAudit> source_model;  ///< of a robot's MJCF; null without one
-  std::vector<std::string> pictures;                     ///< file names below snapshots/
+  std::vector<ReportPart> parts = {};
+  std::vector<std::string> pictures;       ///< file names below snapshots/
   std::vector<ContactLoad> contact_loads;  ///< by witness that ran, then by contact, then all
 };
 

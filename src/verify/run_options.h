@@ -36,6 +36,9 @@ struct RunOptions {
   /// Files of a product that stand in the result's folder, too: names and contents made of what the
   /// run of a motion gave; null: none.
   std::function<std::vector<std::pair<std::string, std::string>>(const Report&)> more_files;
+  /// What a product does with a run of a motion that was judged, before anything is written; null:
+  /// nothing.
+  std::function<void(const Prepared&, Report*)> after_judgement;
   ProgressFunction progress;
 };
 

@@ -16,6 +16,7 @@
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "cli/trust.h"
+#include "features/certify/certificate_report.h"
 #include "features/run/default_setup.h"
 #include "features/run/run_scenario.h"
 #include "mechanism/channels.h"
@@ -68,7 +69,7 @@ namespace {
 struct RunArguments {
   std::vector<std::string> scenarios, set, data;
   RobotArguments robot;
-  std::string out = "out", mode, report_script, kept_audits, agreed;
+  std::string out = "out", mode, report_script, kept_audits, agreed, certify;
   JsonOption json;
   bool no_report = false, no_pictures = false, no_source_model = false, quiet = false,
        verbose = false;
@@ -115,6 +116,16 @@ nlohmann::ordered_json ResultJson(const std::string& file, const RunOutcome& out
           {"findings", FindingObjects(outcome.diagnostics)}};
 }
 
+// What --certify asks for; false (after a message) if it is no number of samples.
+bool ReadCertify(const std::string& text, CertifyOptions* options) {
+  const bool digits = !text.empty() && text.size() < 7 &&
+                      std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
+  options->samples = digits ? std::stoul(text) : 0;
+  if (text == "all" || options->samples > 0) return true;
+  Say(stderr, "error: --certify={}: a number of samples or 'all'\n  hint: --certify=20\n", text);
+  return false;
+}
+
 // Options of all scenarios; false (after a message) if --set is malformed.
 bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   options->out_dir = arguments.out;
@@ -123,6 +134,15 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   options->script_link = arguments.report_script;
   options->kept_audits = arguments.kept_audits;
   options->data = arguments.data;
+  if (!arguments.certify.empty()) {
+    CertifyOptions certify;
+    if (!ReadCertify(arguments.certify, &certify)) return false;
+    options->after_judgement = [certify, options](const Prepared& prepared, Report* report) {
+      CertifyOptions followed = certify;
+      followed.progress = StageOf(options->progress, "proof");
+      AddCertificate(prepared, followed, report);
+    };
+  }
   if (!ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options->scenario.set))
     return false;
   if (!arguments.mode.empty()) {
@@ -253,6 +273,10 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
          "Python …; csv: units and frames of the columns of traces.csv")
       ->delimiter(',')
       ->check(OneOf(DataWords()));
+  run->add_flag(
+      "--certify{10}", arguments->certify,
+      "prove forces in interval arithmetic at 10 spread samples and where witnesses differ "
+      "most; --certify=N: at N, --certify=all: at all samples");
   arguments->json.AddTo(run);
   run->add_flag("--sizing", arguments->sizing, "all figures of the motors that the model states");
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");

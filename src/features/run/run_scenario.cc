@@ -277,6 +277,7 @@ class ScenarioRun {
     RunWitnesses();
     if (outcome_.diagnostics.has_errors()) return BadInput();
     Judge();
+    if (options_.after_judgement) options_.after_judgement(*prepared_, &report_);
     RunSourceModel();
     DrawPictures();
     report_.timing.total_s =

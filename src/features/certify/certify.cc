@@ -1,0 +1,1066 @@
+#include "features/certify/certify.h"
+
+#include <fmt/format.h>
+#include <Eigen/LU>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "base/roles.h"
+#include "features/certify/exact_model.h"
+#include "features/certify/exact_numbers.h"
+#include "mechanism/channels.h"
+#include "mechanism/reach.h"
+#include "reference/reference.h"
+
+namespace mbv {
+namespace {
+
+namespace mp = boost::multiprecision;
+using exact::Equation;
+using exact::Frame;
+using exact::Model;
+using exact::Series;
+using exact::Six;
+using exact::Wrench;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Doubles that bound what intervals hold.
+template <typename T>
+double Below(const T& x) {
+  return std::nextafter(mp::lower(x).template convert_to<double>(), -kInfinity);
+}
+template <typename T>
+double Above(const T& x) {
+  return std::nextafter(mp::upper(x).template convert_to<double>(), kInfinity);
+}
+template <typename T>
+double Size(const T& x) {
+  return std::max(-Below(x), Above(x));
+}
+template <typename T>
+T Middle(const T& x) {
+  return T(mp::median(x));
+}
+template <typename T>
+double Nearest(const T& x) {
+  return mp::median(x).template convert_to<double>();
+}
+template <typename T>
+T Around(const T& middle, double radius) {
+  const T r(radius);
+  return mp::hull(T(middle - r), T(middle + r));
+}
+
+// A sum of n products of positive doubles is computed with less than this relative error.
+double Slack(Eigen::Index n) { return 1.0 + 4.0 * static_cast<double>(n + 4) * kEps; }
+
+// Square systems, scaled by powers of two.
+template <typename T>
+class ProvedSystem {
+ public:
+  struct Entry {
+    int column;
+    T value;
+  };
+
+  ProvedSystem(std::vector<double> row_scale, std::vector<double> column_scale)
+      : row_scale_(std::move(row_scale)), column_scale_(std::move(column_scale)) {}
+
+  void Set(std::vector<std::vector<Entry>> rows) { rows_ = std::move(rows); }
+
+  // An approximate inverse; false where there is none.
+  bool Invert() {
+    const MatX middle = Scaled(nullptr);
+    const Eigen::PartialPivLU<MatX> lu(middle);
+    if (middle.size() == 0) return true;
+    inverse_ = lu.inverse();
+    inverse_size_ = inverse_.cwiseAbs();
+    return inverse_.allFinite();
+  }
+  // ‖1 − R A‖ per row, at most.
+  void Check() {
+    const auto n = static_cast<Eigen::Index>(rows_.size());
+    MatX radius;
+    const MatX middle = Scaled(&radius);
+    const MatX size = middle.cwiseAbs();
+    MatX rest = (inverse_ * middle - MatX::Identity(n, n)).cwiseAbs();
+    // Rounding of the product and of the difference.
+    const double rounding = 2.0 * static_cast<double>(n + 2) * kEps;
+    rest += inverse_size_ * (radius + rounding * size) * Slack(n);
+    contraction_ = rest.rowwise().sum() * Slack(n);
+    contraction_.array() += 4.0 * kEps;
+  }
+  [[nodiscard]] double contraction() const {
+    return contraction_.size() == 0 ? 0.0 : contraction_.maxCoeff();
+  }
+  [[nodiscard]] bool regular() const { return contraction() < 1.0; }
+  [[nodiscard]] double distance_low() const { return (1.0 - contraction()) / Norm() / Slack(2); }
+  [[nodiscard]] double distance_high() const { return (1.0 + contraction()) / Norm() * Slack(2); }
+
+  // |R x|, row by row, at most; scaled.
+  [[nodiscard]] VecX Reached(const std::vector<T>& x) const {
+    VecX size(static_cast<Eigen::Index>(x.size()));
+    for (size_t i = 0; i < x.size(); ++i) {
+      size[static_cast<Eigen::Index>(i)] = Size(x[i]) * row_scale_[i];
+    }
+    return inverse_size_ * size * Slack(size.size());
+  }
+  // Bounds of the error of a solution with this |R residual|; scaled.
+  [[nodiscard]] VecX Errors(const VecX& reached) const {
+    if (reached.size() == 0) return reached;
+    const double share = reached.maxCoeff() / (1.0 - contraction()) * Slack(2);
+    return (reached + contraction_ * share) * Slack(2);
+  }
+  // Takes R residual away from x.
+  void Correct(const std::vector<T>& residual, std::vector<T>* x) const {
+    VecX scaled(static_cast<Eigen::Index>(residual.size()));
+    for (size_t i = 0; i < residual.size(); ++i) {
+      scaled[static_cast<Eigen::Index>(i)] = Nearest(residual[i]) * row_scale_[i];
+    }
+    const VecX step = inverse_ * scaled;
+    for (size_t i = 0; i < x->size(); ++i) {
+      (*x)[i] = Middle(T((*x)[i] - T(step[static_cast<Eigen::Index>(i)] * column_scale_[i])));
+    }
+  }
+  [[nodiscard]] T Widened(const T& x, size_t i, double scaled_error) const {
+    return Around(x, scaled_error * column_scale_[i]);
+  }
+  // Encloses A x = b.
+  [[nodiscard]] std::vector<T> Solve(const std::vector<T>& b) const {
+    std::vector<T> x(b.size(), T(0)), residual(b.size());
+    VecX reached;
+    double last = kInfinity;
+    for (int k = 0; k < 12; ++k) {
+      for (size_t i = 0; i < b.size(); ++i) {
+        residual[i] = -b[i];
+        for (const Entry& entry : rows_[i]) {
+          residual[i] += entry.value * x[static_cast<size_t>(entry.column)];
+        }
+      }
+      reached = Reached(residual);
+      const double now = reached.size() == 0 ? 0.0 : reached.maxCoeff();
+      if (!(now < 0.5 * last)) break;
+      last = now;
+      if (now == 0.0) break;
+      Correct(residual, &x);
+    }
+    // Of the last x.
+    for (size_t i = 0; i < b.size(); ++i) {
+      residual[i] = -b[i];
+      for (const Entry& entry : rows_[i]) {
+        residual[i] += entry.value * x[static_cast<size_t>(entry.column)];
+      }
+    }
+    const VecX errors = Errors(Reached(residual));
+    for (size_t i = 0; i < x.size(); ++i) {
+      x[i] = Widened(x[i], i, errors[static_cast<Eigen::Index>(i)]);
+    }
+    return x;
+  }
+
+ private:
+  [[nodiscard]] double Norm() const {
+    return inverse_.size() == 0 ? 1.0 : inverse_size_.rowwise().sum().maxCoeff();
+  }
+  [[nodiscard]] MatX Scaled(MatX* radius) const {
+    const auto n = static_cast<Eigen::Index>(rows_.size());
+    MatX middle = MatX::Zero(n, n);
+    if (radius != nullptr) *radius = MatX::Zero(n, n);
+    for (size_t i = 0; i < rows_.size(); ++i) {
+      for (const Entry& entry : rows_[i]) {
+        const auto r = static_cast<Eigen::Index>(i);
+        const double scale = row_scale_[i] * column_scale_[static_cast<size_t>(entry.column)];
+        const double low = Below(entry.value), high = Above(entry.value), at = 0.5 * (low + high);
+        middle(r, entry.column) = at * scale;
+        if (radius == nullptr) continue;
+        (*radius)(r, entry.column) =
+            std::nextafter(std::max(high - at, at - low) * scale, kInfinity);
+      }
+    }
+    return middle;
+  }
+
+  std::vector<double> row_scale_, column_scale_;
+  std::vector<std::vector<Entry>> rows_;
+  MatX inverse_, inverse_size_;
+  VecX contraction_;
+};
+
+double PowerOfTwo(double x) { return std::exp2(std::round(std::log2(x))); }
+
+// Indices of independent rows, groups in their order, within one by what is left of each; the
+// others depend on them to 1e-9. Rows that are as small against the group's largest are rounding.
+constexpr double kDependent = 1e-9;
+class RowChoice {
+ public:
+  explicit RowChoice(Eigen::Index columns) : columns_(columns) {}
+
+  // Rows of `group`; their numbers within it, increasing.
+  std::vector<size_t> Choose(MatX group) {
+    std::vector<size_t> chosen;
+    VecX size = group.rowwise().norm();
+    if (size.size() > 0) size = size.cwiseMax(1e-3 * size.maxCoeff());
+    for (const VecX& q : basis_) group -= (group * q) * q.transpose();
+    while (static_cast<Eigen::Index>(basis_.size()) < columns_ && group.rows() > 0) {
+      Eigen::Index best = 0;
+      VecX share(group.rows());
+      for (Eigen::Index i = 0; i < group.rows(); ++i) {
+        share[i] = size[i] > 0.0 ? group.row(i).norm() / size[i] : 0.0;
+      }
+      if (share.maxCoeff(&best) < kDependent) break;
+      VecX q = group.row(best).transpose();
+      for (const VecX& other : basis_) q -= other.dot(q) * other;
+      q.normalize();
+      group -= (group * q) * q.transpose();
+      group.row(best).setZero();
+      basis_.push_back(q);
+      chosen.push_back(static_cast<size_t>(best));
+    }
+    std::sort(chosen.begin(), chosen.end());
+    return chosen;
+  }
+
+ private:
+  Eigen::Index columns_;
+  std::vector<VecX> basis_;
+};
+
+// What the reference found, as a start.
+struct Start {
+  double time_s = 0.0;
+  std::vector<Pose> X_WB;
+  std::vector<double> coupled, turns;
+  CommandSample command;
+};
+
+template <typename T>
+ProvedValue Proved(const std::string& channel, const std::string& unit, const T& x) {
+  ProvedValue value{channel, unit, "", Nearest(x), kNan};
+  const double radius = Size(T(x - Middle(x))), size = Size(x);
+  int digits = 17;
+  if (size > 0.0 && radius > 0.0) {
+    digits = static_cast<int>(std::clamp(std::log10(size / radius) + 2.0, 1.0, 70.0));
+  }
+  value.text = mp::median(x).str(digits, std::ios_base::scientific);
+  // Of the text as it stands.
+  value.radius = Size(T(x - T(value.text.c_str())));
+  return value;
+}
+
+// The words of SampleProof::why_not.
+constexpr const char* kSingular =
+    "not provable: the closure equations are singular here as far as can be seen";
+constexpr const char* kForcesSingular =
+    "not provable: the drives lose control here as far as can be seen";
+
+template <typename T>
+class Prover {
+ public:
+  Prover(const Mechanism& mechanism, const Motion& motion)
+      : model_(mechanism), motion_(motion), length_(PowerOfTwo(CharacteristicLength(mechanism))) {}
+
+  /// Whether reactions of what was proved are left open by statics.
+  [[nodiscard]] bool reactions_open() const { return !columns_.empty() && !reactions_unique_; }
+
+  SampleProof Prove(const Start& start) {
+    SampleProof proof;
+    proof.time_s = start.time_s;
+    proof.bits = std::is_same_v<T, exact::Fine> ? 113 : 240;
+    model_.StartFrom(start.X_WB, &q_);
+    MakeEquations(start);
+    const bool chosen_before = !rows_.empty();
+    proof.why_not = Prove(start, &proof);
+    if (!proof.proved() && chosen_before) {
+      // Equations that were independent at one pose may not be so at another one.
+      rows_.clear(), columns_.clear();
+      model_.StartFrom(start.X_WB, &q_);
+      proof.left_open = 0.0;
+      proof.why_not = Prove(start, &proof);
+    }
+    if (proof.proved()) Report(&proof);
+    return proof;
+  }
+
+ private:
+  using System = ProvedSystem<T>;
+  using Rows = std::vector<std::vector<typename System::Entry>>;
+  using Virtual = typename Model<T>::Virtual;
+
+  const Mechanism& mechanism() const { return model_.mechanism(); }
+
+  struct Asked {
+    Equation<T> equation;
+    T value = T(0), rate = T(0), acceleration = T(0);
+  };
+
+  std::string Prove(const Start& start, SampleProof* proof) {
+    std::string trouble = ChooseRows();
+    if (trouble.empty()) trouble = FindPose(proof);
+    if (!trouble.empty()) return trouble;
+    FindRates();
+    return FindForces(start, proof);
+  }
+
+  void MakeEquations(const Start& start) {
+    asked_.clear(), driven_.clear();
+    for (Equation<T>& equation : model_.Closures(start.coupled)) {
+      asked_.push_back({std::move(equation)});
+    }
+    closures_ = asked_.size();
+    const size_t drives = mechanism().drives.size(), elements = mechanism().elements.size();
+    const auto turn = [&](size_t k) {
+      return elements + k < start.turns.size() ? start.turns[elements + k] : 0.0;
+    };
+    for (size_t k = 0; k < motion_.commands.size(); ++k) {
+      const Command& command = motion_.commands[k];
+      const auto at = static_cast<Eigen::Index>(k);
+      Asked asked;
+      asked.value = T(start.command.position[at]);
+      asked.rate = T(start.command.velocity[at]);
+      asked.acceleration = T(start.command.acceleration[at]);
+      for (const Command::Term& term : command.terms) {
+        const Coordinate& c = term.coordinate;
+        const auto i = static_cast<size_t>(c.index);
+        double near = c.kind == Coordinate::Kind::kDrive        ? turn(i)
+                      : c.kind == Coordinate::Kind::kPrescribed ? turn(drives + i)
+                                                                : HomeValue(mechanism(), c);
+        if (command.terms.size() == 1) near = start.command.position[at] / term.factor;
+        Equation<T> part = model_.CoordinateEquation(c, near);
+        part.terms.front().polynomial.front() = T(term.factor);
+        asked.equation.terms.push_back(std::move(part.terms.front()));
+      }
+      asked_.push_back(std::move(asked));
+    }
+    for (size_t s = 0; s < model_.spins().size(); ++s) {
+      asked_.push_back({Model<T>::SpinEquation(static_cast<int>(s))});
+    }
+    for (size_t d = 0; d < drives; ++d) {
+      driven_.push_back(
+          model_.CoordinateEquation({Coordinate::Kind::kDrive, static_cast<int>(d), 0}, turn(d)));
+    }
+    for (size_t p = 0; p < mechanism().prescribed.size(); ++p) {
+      driven_.push_back(model_.CoordinateEquation(
+          {Coordinate::Kind::kPrescribed, static_cast<int>(p), 0}, turn(drives + p)));
+    }
+    element_equations_.clear();
+    for (size_t e = 0; e < elements; ++e) {
+      const ForceElement& element = mechanism().elements[e];
+      const double near = e < start.turns.size() ? start.turns[e] : 0.0;
+      // Of a ball's rotation the coordinates are not used.
+      element_equations_.push_back(
+          ActsOnBall(mechanism(), element) ? Equation<T>() : model_.ElementEquation(element, near));
+    }
+  }
+
+  [[nodiscard]] double RowScale(const Equation<T>& equation) const {
+    return equation.length() ? 1.0 / length_ : 1.0;
+  }
+  [[nodiscard]] double ColumnScale(size_t j) const {
+    return model_.IsLengthCoordinate(static_cast<int>(j)) ? length_ : 1.0;
+  }
+
+  // Rows of equations by the tree's coordinates. `turned`: of spins also the derivative of their
+  // turn, which counts for positions.
+  [[nodiscard]] Rows Jacobian(const std::vector<size_t>& rows, const std::vector<T>& q,
+                              const typename Model<T>::Poses& bodies, bool turned) const {
+    const std::vector<Virtual> motions = model_.VirtualAt(q, bodies, false);
+    Rows J(rows.size());
+    for (size_t i = 0; i < rows.size(); ++i) {
+      const Equation<T>& equation = asked_[rows[i]].equation;
+      const std::vector<Wrench<T>> wrenches = model_.WrenchesAt(equation, bodies);
+      std::vector<Wrench<T>> turn;
+      if (turned && equation.spin >= 0) turn = {model_.SpinTurnWrench(equation.spin, bodies)};
+      for (size_t j = 0; j < motions.size(); ++j) {
+        if (!Moves(motions[j], wrenches)) continue;
+        T slope = model_.Along(motions[j], wrenches);
+        if (!turn.empty()) slope = mp::hull(slope, model_.Along(motions[j], turn));
+        J[i].push_back({static_cast<int>(j), std::move(slope)});
+      }
+    }
+    return J;
+  }
+  [[nodiscard]] bool Moves(const Virtual& motion, const std::vector<Wrench<T>>& wrenches) const {
+    return std::any_of(wrenches.begin(), wrenches.end(), [&](const Wrench<T>& wrench) {
+      return model_.IsBeyond(wrench.child, motion.body) !=
+             model_.IsBeyond(wrench.parent, motion.body);
+    });
+  }
+  static MatX Approximate(const Rows& rows, Eigen::Index columns) {
+    MatX A = MatX::Zero(static_cast<Eigen::Index>(rows.size()), columns);
+    for (size_t i = 0; i < rows.size(); ++i) {
+      for (const auto& entry : rows[i]) {
+        A(static_cast<Eigen::Index>(i), entry.column) = Nearest(entry.value);
+      }
+    }
+    return A;
+  }
+
+  // The equations that determine the pose, once for the motion.
+  std::string ChooseRows() {
+    if (!rows_.empty() || model_.coordinates() == 0) return "";
+    std::vector<size_t> all(asked_.size());
+    for (size_t i = 0; i < all.size(); ++i) all[i] = i;
+    const auto columns = static_cast<Eigen::Index>(model_.coordinates());
+    MatX J = Approximate(Jacobian(all, q_, model_.PosesAt(q_), false), columns);
+    for (size_t i = 0; i < all.size(); ++i) {
+      J.row(static_cast<Eigen::Index>(i)) *= RowScale(asked_[i].equation);
+    }
+    for (Eigen::Index j = 0; j < columns; ++j) J.col(j) *= ColumnScale(static_cast<size_t>(j));
+    RowChoice choice(columns);
+    const auto split = static_cast<Eigen::Index>(closures_);
+    std::vector<size_t> rows = choice.Choose(J.topRows(split));
+    closure_rank_ = rows.size();
+    for (const size_t k : choice.Choose(J.bottomRows(J.rows() - split))) {
+      rows.push_back(closures_ + k);
+    }
+    if (rows.size() != static_cast<size_t>(columns)) return kSingular;
+    rows_ = std::move(rows);
+    return "";
+  }
+
+  // (1)
+  std::string FindPose(SampleProof* proof) {
+    const size_t n = rows_.size();
+    std::vector<double> row_scale, column_scale;
+    for (size_t i = 0; i < n; ++i) {
+      row_scale.push_back(RowScale(asked_[rows_[i]].equation));
+      column_scale.push_back(ColumnScale(i));
+    }
+    system_.emplace(row_scale, column_scale);
+    // The box lies around the start, which is within a small share of its radius of the solution.
+    const std::vector<T> start = q_;
+    VecX reached;
+    bool proved = false;
+    for (const double radius : {1e-6, 1e-8, 1e-10, 1e-12}) {
+      std::vector<T> box = start;
+      for (size_t j = 0; j < n; ++j) box[j] = system_->Widened(start[j], j, radius);
+      system_->Set(Jacobian(rows_, box, model_.PosesAt(box), true));
+      if (!system_->Invert()) return kSingular;
+      system_->Check();
+      if (!system_->regular()) continue;
+      q_ = start;
+      if (!Refine(&reached)) return kSingular;
+      // What is left of the radius where the middle moved.
+      proof->unique_within = radius - Moved(start) * Slack(2);
+      const double step = reached.size() == 0 ? 0.0 : reached.maxCoeff();
+      proved = step + system_->contraction() * proof->unique_within < proof->unique_within;
+      if (proved) break;
+    }
+    if (!proved) return kSingular;
+    const VecX errors = system_->Errors(reached);
+    for (size_t j = 0; j < n; ++j) {
+      q_[j] = system_->Widened(q_[j], j, errors[static_cast<Eigen::Index>(j)]);
+    }
+    bodies_ = model_.PosesAt(q_);
+    const std::set<size_t> taken(rows_.begin(), rows_.end());
+    for (size_t i = 0; i < asked_.size(); ++i) {
+      if (taken.count(i) == 0) {
+        const T open = model_.ValueAt(asked_[i].equation, bodies_) - asked_[i].value;
+        proof->left_open = std::max(proof->left_open, Size(open));
+      }
+    }
+    system_->Set(Jacobian(rows_, q_, bodies_, false));
+    system_->Check();
+    proof->closure_distance_low = system_->distance_low();
+    proof->closure_distance_high = system_->distance_high();
+    return system_->regular() ? "" : kSingular;
+  }
+
+  // Newton's method to the last digits; |R residual| then.
+  bool Refine(VecX* reached) {
+    double last = kInfinity;
+    for (int k = 0;; ++k) {
+      const std::vector<T> residual = Residuals(q_);
+      *reached = system_->Reached(residual);
+      const double now = reached->size() == 0 ? 0.0 : reached->maxCoeff();
+      if (!std::isfinite(now)) return false;
+      if (now == 0.0 || !(now < 0.5 * last) || k == 20) return true;
+      last = now;
+      system_->Correct(residual, &q_);
+    }
+  }
+  // The largest scaled way from there.
+  [[nodiscard]] double Moved(const std::vector<T>& start) const {
+    double most = 0.0;
+    for (size_t j = 0; j < q_.size(); ++j) {
+      most = std::max(most, Size(T(q_[j] - start[j])) / ColumnScale(j));
+    }
+    return most;
+  }
+
+  [[nodiscard]] std::vector<T> Residuals(const std::vector<T>& q) const {
+    const typename Model<T>::Poses bodies = model_.PosesAt(q);
+    std::vector<T> residual;
+    typename Model<T>::template Last<T> last;
+    for (const size_t i : rows_) {
+      residual.push_back(model_.ValueAt(asked_[i].equation, bodies, &last) - asked_[i].value);
+    }
+    return residual;
+  }
+
+  void FindRates() {
+    std::vector<T> asked;
+    for (const size_t i : rows_) asked.push_back(asked_[i].rate);
+    const std::vector<T> rate = system_->Solve(asked);
+    std::vector<Series<T>> q(q_.size());
+    for (size_t j = 0; j < q_.size(); ++j) q[j] = Series<T>(q_[j], rate[j], T(0));
+    motions_ = model_.MotionsAt(q);
+    typename Model<T>::template Last<Series<T>> last;
+    for (size_t k = 0; k < rows_.size(); ++k) {
+      const Asked& of = asked_[rows_[k]];
+      asked[k] = of.acceleration - (of.equation.spin >= 0
+                                        ? model_.SpinAcceleration(of.equation.spin, motions_)
+                                        : model_.ValueAt(of.equation, motions_, &last).a);
+    }
+    const std::vector<T> acceleration = system_->Solve(asked);
+    for (size_t j = 0; j < q_.size(); ++j) q[j].a = acceleration[j];
+    motions_ = model_.MotionsAt(q);
+  }
+
+  // (2) of exact_model.h.
+  std::string FindForces(const Start& start, SampleProof* proof) {
+    carried_ = model_.Required(motions_);
+    std::string trouble = Apply(start);
+    if (!trouble.empty()) return trouble;
+    const std::vector<Virtual> motions = model_.VirtualAt(q_, bodies_, true);
+    MakeColumns();
+    const size_t n = motions.size();
+    if (columns_.empty() && n > 0) {
+      if (trouble = ChooseColumns(motions); !trouble.empty()) return trouble;
+    }
+    std::vector<double> row_scale, column_scale;
+    for (size_t j = 0; j < n; ++j) {
+      // A motion of length 1 does work by forces, one of an angle by moments.
+      row_scale.push_back(IsSlide(j) ? 1.0 : 1.0 / length_);
+    }
+    for (const size_t k : columns_) column_scale.push_back(forces_[k].length ? 1.0 : length_);
+    System system(row_scale, column_scale);
+    Rows A(n);
+    std::map<int, Six<T>> beyond;
+    std::vector<T> work(n);
+    for (size_t j = 0; j < n; ++j) {
+      const int body = motions[j].body;
+      if (beyond.count(body) == 0) beyond[body] = model_.SumBeyond(body, carried_);
+      work[j] = Dot(motions[j].twist, beyond[body]);
+      for (size_t k = 0; k < columns_.size(); ++k) {
+        const std::vector<Wrench<T>>& wrenches = forces_[columns_[k]].wrenches;
+        if (!Moves(motions[j], wrenches)) continue;
+        A[j].push_back({static_cast<int>(k), model_.Along(motions[j], wrenches)});
+      }
+    }
+    system.Set(std::move(A));
+    if (!system.Invert()) return kForcesSingular;
+    system.Check();
+    if (!system.regular()) return kForcesSingular;
+    proof->force_distance_low = system.distance_low();
+    proof->force_distance_high = system.distance_high();
+    force_ = system.Solve(work);
+    return "";
+  }
+
+  [[nodiscard]] bool IsSlide(size_t virtual_motion) const {
+    return virtual_motion < static_cast<size_t>(model_.coordinates()) &&
+           model_.IsLengthCoordinate(static_cast<int>(virtual_motion));
+  }
+
+  // What may act: closures, drives and prescribed joints, moments about idle spins.
+  struct Force {
+    std::vector<Wrench<T>> wrenches;
+    bool length = true;
+    bool needed = false;  ///< of a drive or a prescribed joint
+  };
+  void MakeColumns() {
+    forces_.clear();
+    const std::vector<bool> transmitting = model_.Transmitting();
+    const auto add = [&](const Equation<T>& equation, bool needed) {
+      forces_.push_back({model_.WrenchesAt(equation, bodies_), equation.length(), needed});
+    };
+    for (size_t k = 0; k < closures_; ++k) {
+      if (transmitting[k]) add(asked_[k].equation, false);
+    }
+    transmitting_ = forces_.size();
+    for (const Equation<T>& equation : driven_) add(equation, true);
+    for (size_t s = 0; s < model_.spins().size(); ++s) {
+      add(Model<T>::SpinEquation(static_cast<int>(s)), true);
+    }
+  }
+
+  std::string ChooseColumns(const std::vector<Virtual>& motions) {
+    const auto n = static_cast<Eigen::Index>(motions.size());
+    MatX A = MatX::Zero(static_cast<Eigen::Index>(forces_.size()), n);
+    for (size_t k = 0; k < forces_.size(); ++k) {
+      for (size_t j = 0; j < motions.size(); ++j) {
+        A(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) =
+            Nearest(model_.Along(motions[j], forces_[k].wrenches)) *
+            (forces_[k].length ? 1.0 : length_) * (IsSlide(j) ? 1.0 : 1.0 / length_);
+      }
+    }
+    const auto split = static_cast<Eigen::Index>(transmitting_);
+    RowChoice choice(n);
+    std::vector<size_t> columns = choice.Choose(A.topRows(split));
+    reactions_unique_ = columns.size() == transmitting_;
+    const std::vector<size_t> needed = choice.Choose(A.bottomRows(A.rows() - split));
+    for (const size_t k : needed) columns.push_back(transmitting_ + k);
+    if (needed.size() != forces_.size() - transmitting_) {
+      return "not provable: the drives share their forces, statics leaves a choice";
+    }
+    if (static_cast<Eigen::Index>(columns.size()) != n) return kForcesSingular;
+    columns_ = std::move(columns);
+    return "";
+  }
+
+  void Exert(const T& force, const std::vector<Wrench<T>>& wrenches) {
+    for (const Wrench<T>& wrench : wrenches) {
+      const Six<T> part = Times(force, wrench.on_child);
+      Six<T>&child = carried_[static_cast<size_t>(wrench.child)],
+      &parent = carried_[static_cast<size_t>(wrench.parent)];
+      child = child - part;
+      parent = parent + part;
+    }
+  }
+
+  // Loads, springs and elements; gravity's compensation that drives exert.
+  std::string Apply(const Start& start) {
+    for (const LoadSample& load : start.command.loads) {
+      const auto b = static_cast<size_t>(load.body);
+      exact::Vector<T> f = exact::Lifted<T>(load.force), m = exact::Lifted<T>(load.moment);
+      if (load.in_body_axes) f = bodies_[b].R * f, m = bodies_[b].R * m;
+      const exact::Vector<T> at = bodies_[b].p + bodies_[b].R * exact::Lifted<T>(load.p_BoQ_B);
+      carried_[b] = carried_[b] - Six<T>{m + Cross(at, f), f};
+    }
+    for (const SpringDamper& spring : mechanism().springs) {
+      const Equation<T> length = model_.LengthEquation(spring);
+      const Series<T> x = model_.ValueAt(length, motions_);
+      const T thrust =
+          -T(spring.stiffness) * (x.v - T(spring.free_length_m)) - T(spring.damping) * x.r;
+      Exert(thrust, model_.WrenchesAt(length, bodies_));
+    }
+    for (size_t d = 0; d < mechanism().drives.size(); ++d) {
+      const Drive& drive = mechanism().drives[d];
+      if (!drive.compensates_gravity) continue;
+      Exert(T(-model_.CompensationAlong(drive, bodies_)), model_.WrenchesAt(driven_[d], bodies_));
+    }
+    for (size_t e = 0; e < mechanism().elements.size(); ++e) {
+      const std::string trouble = ApplyElement(e);
+      if (!trouble.empty()) return trouble;
+    }
+    return "";
+  }
+
+  std::string ApplyElement(size_t e) {
+    using std::exp;
+    const ForceElement& element = mechanism().elements[e];
+    Series<T> x;
+    std::vector<Wrench<T>> wrenches;
+    if (ActsOnBall(mechanism(), element)) {
+      std::tie(x, wrenches) = model_.BallMotion(element, bodies_, motions_);
+    } else {
+      x = model_.ValueAt(element_equations_[e], motions_);
+      wrenches = model_.WrenchesAt(element_equations_[e], bodies_);
+    }
+    T force(0);
+    if (const auto* damping = std::get_if<DampingLaw>(&element.law)) {
+      force = -T(damping->damping) * x.r;
+    } else if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
+      std::vector<T> polynomial(spring->polynomial.begin(), spring->polynomial.end());
+      force = -(T(spring->preload) + exact::Polynomial(polynomial, T(x.v - T(spring->free))));
+    } else if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
+      const T n(rotor->ratio), J(rotor->inertia);
+      force = -J * n * n * x.a;
+      if (rotor->carrier) {
+        const auto [along, moment] = model_.OnCarrier(*rotor->carrier, x, motions_);
+        force -= J * n * along;
+        const auto b = static_cast<size_t>(rotor->carrier->body);
+        carried_[b].m = carried_[b].m + exact::Times(T(J * n), moment);
+      }
+    } else if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
+      const double rest = RestRate(mechanism(), element, motion_.duration_s);
+      const double low = Below(x.r), high = Above(x.r);
+      int sign = 0;
+      if (low > rest) {
+        sign = 1;
+      } else if (high < -rest) {
+        sign = -1;
+      } else if (!(low >= -rest && high <= rest)) {
+        return fmt::format("not provable: whether '{}' slides or rests is open", element.name);
+      }
+      if (sign != 0) {
+        T size(friction->coulomb);
+        if (friction->stribeck_rate > 0.0) {
+          const T slowness = x.r / T(friction->stribeck_rate);
+          size += (T(friction->breakaway) - T(friction->coulomb)) * exp(T(-slowness * slowness));
+        }
+        force = T(-sign) * size;
+      }
+    }
+    Exert(force, wrenches);
+    return "";
+  }
+
+  void Report(SampleProof* proof) {
+    const size_t drives = mechanism().drives.size();
+    std::vector<T> all(forces_.size(), T(0));
+    for (size_t k = 0; k < columns_.size(); ++k) all[columns_[k]] = force_[k];
+    for (size_t d = 0; d < drives; ++d) {
+      const Drive& drive = mechanism().drives[d];
+      const Series<T> x = model_.ValueAt(driven_[d], motions_);
+      const std::string unit = PositionUnit(mechanism(), drive);
+      const auto add = [&](Quantity quantity, const std::string& of, const T& value) {
+        proof->values.push_back(Proved(ChannelName(quantity, drive.name), of, value));
+      };
+      add(Quantity::kPosition, unit, x.v);
+      add(Quantity::kVelocity, unit + "/s", x.r);
+      add(Quantity::kAcceleration, unit + "/s^2", x.a);
+      add(Quantity::kForce, ForceUnit(mechanism(), drive), all[transmitting_ + d]);
+      proof->values.back().force = true;
+    }
+    for (size_t p = 0; p < mechanism().prescribed.size(); ++p) {
+      const Prescribed& prescribed = mechanism().prescribed[p];
+      const bool slides =
+          IsLength(mechanism().joints[static_cast<size_t>(prescribed.joint)].kind, 0);
+      proof->values.push_back(Proved(ChannelName(Quantity::kBaseForce, prescribed.name),
+                                     slides ? "N" : "N m", all[transmitting_ + drives + p]));
+      proof->values.back().force = true;
+    }
+    if (reactions_unique_) ReportReactions(all, proof);
+  }
+
+  void ReportReactions(const std::vector<T>& all, SampleProof* proof) {
+    // What is left for the tree's joints.
+    for (size_t k = 0; k < forces_.size(); ++k) Exert(all[k], forces_[k].wrenches);
+    std::vector<Six<T>> on_child(mechanism().joints.size());
+    for (size_t t = 0; t < mechanism().tree_joints.size(); ++t) {
+      const int outboard = model_.OutboardOf(t);
+      const Six<T> sum = model_.SumBeyond(outboard, carried_);
+      on_child[static_cast<size_t>(mechanism().tree_joints[t])] =
+          mechanism().tree_reversed[t] ? Six<T>() - sum : sum;
+    }
+    size_t at = 0;
+    const std::vector<bool> transmitting = model_.Transmitting();
+    size_t equation = 0;
+    for (size_t j = 0; j < mechanism().joints.size(); ++j) {
+      if (!mechanism().joints[j].closure) continue;
+      const auto locks = static_cast<size_t>(6 - DofsOf(mechanism().joints[j].kind));
+      for (size_t k = 0; k < locks; ++k, ++equation) {
+        if (!transmitting[equation]) continue;
+        on_child[j] = on_child[j] + Times(all[at], forces_[at].wrenches.front().on_child);
+        ++at;
+      }
+    }
+    for (size_t j = 0; j < mechanism().joints.size(); ++j) {
+      const Joint& joint = mechanism().joints[j];
+      const std::array<T, 6> parts = model_.InJoint(joint, on_child[j], bodies_);
+      for (int c = 0; c < 6; ++c) {
+        proof->values.push_back(Proved(ChannelName(Quantity::kReaction, joint.name, c),
+                                       c < 3 ? "N" : "N m", parts[static_cast<size_t>(c)]));
+      }
+    }
+  }
+
+  Model<T> model_;
+  const Motion& motion_;
+  const double length_;
+  std::vector<T> q_;
+  std::vector<Asked> asked_;  ///< closures, commands, idle spins
+  size_t closures_ = 0, closure_rank_ = 0, transmitting_ = 0;
+  std::vector<Equation<T>> driven_, element_equations_;
+  std::vector<size_t> rows_, columns_;  ///< of asked_, of forces_
+  bool reactions_unique_ = false;
+  std::optional<System> system_;
+  typename Model<T>::Poses bodies_;
+  typename Model<T>::Motions motions_;
+  std::vector<Six<T>> carried_;  ///< required less applied, per body
+  std::vector<Force> forces_;
+  std::vector<T> force_;
+};
+
+// Why a mechanism in motion is not served.
+std::string WhyNotServed(const Mechanism& mechanism, const Motion& motion) {
+  if (motion.free()) return "a free motion: forces are given, and motions are integrated";
+  for (const Load& load : motion.loads) {
+    if (!load.following.empty()) {
+      return fmt::format("load '{}' is an expression, which is evaluated in doubles", load.name);
+    }
+  }
+  for (const ForceElement& element : mechanism.elements) {
+    const auto* friction = std::get_if<FrictionLaw>(&element.law);
+    if (friction != nullptr && friction->coefficient > 0.0) {
+      return Described(mechanism, element) + " depends on the joint's load";
+    }
+    if (element.bushing >= 0 && element.coordinate >= 3) {
+      return Described(mechanism, element) + " acts along a rotation vector";
+    }
+  }
+  return "";
+}
+
+using Clock = std::chrono::steady_clock;
+double Since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// The sample at which drive forces of two witnesses differ most, by the largest force of the unit.
+size_t WorstSample(const Mechanism& mechanism, const std::vector<CertifiedTrace>& traces) {
+  size_t worst = 0;
+  double most = -1.0;
+  for (size_t a = 0; a < traces.size(); ++a) {
+    for (size_t b = a + 1; b < traces.size(); ++b) {
+      const Trace &x = *traces[a].trace, &y = *traces[b].trace;
+      for (const Drive& drive : mechanism.drives) {
+        const int i = x.Find(Quantity::kForce, drive.name),
+                  j = y.Find(Quantity::kForce, drive.name);
+        if (i < 0 || j < 0) continue;
+        const Eigen::Index n = std::min(x.values.rows(), y.values.rows());
+        if (n == 0) continue;
+        const double scale = x.values.col(i).head(n).cwiseAbs().maxCoeff();
+        for (Eigen::Index s = 0; s < n; ++s) {
+          const double off = std::abs(x.values(s, i) - y.values(s, j)) / scale;
+          if (off > most) most = off, worst = static_cast<size_t>(s);
+        }
+      }
+    }
+  }
+  return worst;
+}
+
+std::set<size_t> ChosenSamples(size_t count, size_t spread, size_t worst) {
+  std::set<size_t> chosen;
+  if (spread == 0 || spread >= count) {
+    for (size_t i = 0; i < count; ++i) chosen.insert(i);
+    return chosen;
+  }
+  for (size_t k = 0; k < spread; ++k) {
+    chosen.insert(spread == 1 ? 0 : (k * (count - 1) + (spread - 1) / 2) / (spread - 1));
+  }
+  chosen.insert(worst);
+  return chosen;
+}
+
+// The largest values of a witness' channels by quantity and unit, over the whole motion: errors
+// relate to them. Rates and accelerations that a motion has not are as large as those of a motion
+// over the same range in its time, which is no less than a share of a radian or of the
+// characteristic length; forces by themselves at least a share of the weights and of the largest
+// drive force, moments with the characteristic length; base forces and reactions are no smaller
+// than drive forces.
+constexpr double kLeastShare = 1e-6;
+class Scales {
+ public:
+  Scales(const Trace& trace, const Mechanism& mechanism, double duration_s)
+      : trace_(trace), length_(CharacteristicLength(mechanism)) {
+    for (const Body& body : mechanism.bodies) force_ += body.mass * mechanism.gravity_W.norm();
+    force_ *= kLeastShare;
+    for (size_t c = 0; c < trace.channels.size(); ++c) {
+      const Channel& channel = trace.channels[c];
+      const auto column = trace.values.col(static_cast<Eigen::Index>(c));
+      if (column.size() == 0 || !column.allFinite()) continue;
+      double& largest = largest_[Key(channel.quantity, channel.unit)];
+      const double size = column.cwiseAbs().maxCoeff();
+      largest = std::max(largest, size);
+      if (channel.quantity == Quantity::kForce) {
+        force_ = std::max(force_, channel.unit == "N" ? size : size / length_);
+      }
+      if (channel.quantity != Quantity::kPosition) continue;
+      const double range = std::max(column.maxCoeff() - column.minCoeff(),
+                                    kLeastShare * (channel.unit == "m" ? length_ : 1.0));
+      for (const auto& [quantity, power, per] : {std::tuple(Quantity::kVelocity, 1, "/s"),
+                                                 std::tuple(Quantity::kAcceleration, 2, "/s^2")}) {
+        double& floor = largest_[Key(quantity, channel.unit + per)];
+        floor = std::max(floor, range / std::pow(duration_s, power));
+      }
+    }
+  }
+  // Of a channel.
+  [[nodiscard]] double Of(size_t column) const {
+    const Channel& channel = trace_.channels[column];
+    const auto at = largest_.find(Key(channel.quantity, channel.unit));
+    const double largest = at == largest_.end() ? 0.0 : at->second;
+    const double force = channel.unit == "N" ? force_ : force_ * length_;
+    switch (channel.quantity) {
+      case Quantity::kForce:
+        return std::max(largest, kLeastShare * force);
+      case Quantity::kBaseForce:
+      case Quantity::kReaction:
+        return std::max(largest, force);
+      default:
+        return largest;
+    }
+  }
+
+ private:
+  static std::pair<int, std::string> Key(Quantity quantity, const std::string& unit) {
+    return {static_cast<int>(quantity), unit};
+  }
+  const Trace& trace_;
+  const double length_;
+  double force_ = 0.0;
+  std::map<std::pair<int, std::string>, double> largest_;
+};
+
+void Compare(const CertifiedTrace& of, const Mechanism& mechanism, double duration_s,
+             const std::vector<SampleProof>& samples, double computed_limit,
+             std::vector<WitnessProof>* proofs) {
+  WitnessProof proof;
+  proof.witness = of.witness;
+  proof.engine = of.engine;
+  proof.limit = of.engine ? of.limit : computed_limit;
+  const Scales scales(*of.trace, mechanism, duration_s);
+  for (const SampleProof& sample : samples) {
+    for (const ProvedValue& value : sample.values) {
+      const int column = of.trace->Find(value.channel);
+      if (column < 0 || static_cast<Eigen::Index>(sample.index) >= of.trace->values.rows()) {
+        continue;
+      }
+      const double stated = of.trace->values(static_cast<Eigen::Index>(sample.index), column);
+      if (!std::isfinite(stated)) continue;
+      const double largest = scales.Of(static_cast<size_t>(column));
+      const double off =
+          std::abs(stated - value.value) + value.radius + kEps * std::abs(value.value);
+      const double error = largest > 0.0 ? off / largest : off > value.radius ? kInfinity : 0.0;
+      ++proof.values;
+      const Quantity quantity = of.trace->channels[static_cast<size_t>(column)].quantity;
+      const bool force = quantity == Quantity::kForce || quantity == Quantity::kBaseForce;
+      double& kind = force                             ? proof.force_error
+                     : quantity == Quantity::kReaction ? proof.reaction_error
+                                                       : proof.motion_error;
+      if (quantity == Quantity::kReaction) ++proof.reactions;
+      if (force && largest > 0.0) {
+        const double least =
+            (std::abs(stated - value.value) - value.radius - kEps * std::abs(value.value)) /
+            largest;
+        proof.force_error_at_least = std::max(proof.force_error_at_least, least);
+      }
+      if (!(error > kind)) continue;
+      kind = error;
+      if (force) proof.time_s = sample.time_s, proof.channel = value.channel;
+    }
+  }
+  if (proof.values == 0) return;
+  proof.wrong = std::isfinite(proof.limit) && proof.force_error_at_least > proof.limit;
+  proofs->push_back(std::move(proof));
+}
+
+}  // namespace
+
+double WitnessProof::digits() const { return -std::log10(force_error); }
+
+size_t Certificate::proved() const {
+  return static_cast<size_t>(std::count_if(samples.begin(), samples.end(),
+                                           [](const SampleProof& s) { return s.proved(); }));
+}
+
+const WitnessProof* Certificate::FirstWrong() const {
+  for (const WitnessProof& witness : witnesses) {
+    if (witness.wrong) return &witness;
+  }
+  return nullptr;
+}
+
+std::string WitnessProof::Sentence() const {
+  const Role* role = FindRole(witness);
+  return fmt::format(
+      "proved: {} is off by {:.1e} of the largest drive force at t = {:g} s ({}), limit {:.1e}",
+      role == nullptr ? witness : role->called, force_error_at_least, time_s, channel, limit);
+}
+
+std::string Certificate::Sentence() const {
+  if (!why_not.empty()) return "drive forces are not certified: " + why_not;
+  double digits = kInfinity;
+  std::string engines;
+  for (const WitnessProof& w : witnesses) {
+    if (w.engine) {
+      const Role* role = FindRole(w.witness);
+      engines += fmt::format("; {} is right to {:.1f}", role == nullptr ? w.witness : role->called,
+                             w.digits());
+    } else if (!w.wrong) {
+      digits = std::min(digits, w.digits());
+    }
+  }
+  std::string text =
+      fmt::format("drive forces proved at {} of {} samples", proved(), samples.size());
+  if (std::isfinite(digits)) {
+    text = fmt::format("drive forces proved to {:.0f} digits at {} of {} samples",
+                       std::floor(digits), proved(), samples.size());
+  }
+  return text + engines;
+}
+
+Certificate Certify(const Mechanism& mechanism, const Motion& motion,
+                    const std::vector<CertifiedTrace>& traces, const CertifyOptions& options) {
+  const Clock::time_point begun = Clock::now();
+  Certificate certificate;
+  certificate.why_not = WhyNotServed(mechanism, motion);
+  if (!certificate.why_not.empty()) return certificate;
+  const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
+  const std::set<size_t> chosen =
+      ChosenSamples(times.size(), options.samples, WorstSample(mechanism, traces));
+  Prover<exact::Fine> fine(mechanism, motion);
+  std::unique_ptr<Prover<exact::Finest>> finest;
+  ReferenceOptions quiet;
+  quiet.explain_unreached = false;
+  ReferenceSolver solver(mechanism, motion, quiet);
+  ReferenceSample at;
+  Start start;
+  size_t done = 0;
+  for (size_t i = 0; i <= *chosen.rbegin(); ++i) {
+    EvaluateMotion(motion, times[i], &start.command);
+    const RunSummary reached = solver.Kinematics(start.command, &at);
+    if (chosen.count(i) == 0 && reached.ok()) continue;
+    SampleProof proof;
+    const Clock::time_point sample_begun = Clock::now();
+    if (reached.ok()) {
+      start.time_s = times[i];
+      start.X_WB = at.states.X_WB;
+      start.coupled = at.states.coupled, start.turns = at.states.turns;
+      proof = fine.Prove(start);
+      if (!proof.proved() || options.least_bits > proof.bits) {
+        if (finest == nullptr) {
+          finest = std::make_unique<Prover<exact::Finest>>(mechanism, motion);
+        }
+        proof = finest->Prove(start);
+      }
+    } else {
+      proof.why_not = "not provable: the reference found no pose to start from: " + reached.message;
+    }
+    proof.index = i, proof.time_s = times[i];
+    proof.wall_s = Since(sample_begun);
+    certificate.samples.push_back(std::move(proof));
+    if (options.progress) {
+      options.progress(static_cast<double>(++done) / static_cast<double>(chosen.size()));
+    }
+    if (!reached.ok()) break;
+  }
+  for (const CertifiedTrace& trace : traces) {
+    Compare(trace, mechanism, motion.duration_s, certificate.samples, options.limit,
+            &certificate.witnesses);
+  }
+  double open = 0.0;
+  for (const SampleProof& sample : certificate.samples) open = std::max(open, sample.left_open);
+  if (open > 1e-30) {
+    certificate.left_out.push_back(
+        fmt::format("loops are closed more than once: as many equations are taken as are "
+                    "independent, the others "
+                    "are off by at most {:.1e} (m or direction cosines), so far do the model's "
+                    "doubles contradict "
+                    "each other",
+                    open));
+  }
+  if (fine.reactions_open()) {
+    certificate.left_out.emplace_back(
+        "reactions are not proved: statics leaves a choice among those of redundant constraints");
+  }
+  certificate.left_out.emplace_back(
+      "which of several assembly modes is meant: the one of the reference's pose is proved");
+  certificate.wall_s = Since(begun);
+  return certificate;
+}
+
+}  // namespace mbv

@@ -1,0 +1,14 @@
+// Intervals of 113 and of 240 bits that hold every real result (MPFI, on MPFR).
+#pragma once
+
+#include <boost/multiprecision/mpfi.hpp>
+
+namespace mbv::exact {
+
+namespace mp = boost::multiprecision;
+template <unsigned kDigits>
+using Enclosure = mp::number<mp::mpfi_float_backend<kDigits>, mp::et_off>;
+using Fine = Enclosure<34>;
+using Finest = Enclosure<73>;
+
+}  // namespace mbv::exact

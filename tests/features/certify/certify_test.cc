@@ -1,0 +1,261 @@
+// Proved digits: against exact fractions, finer intervals and slips; where nothing is proved.
+#include "features/certify/certify.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <cmath>
+#include <filesystem>
+
+#include "features/certify/certificate_report.h"
+#include "features/run/run_scenario.h"
+#include "model_file/load_model.h"
+#include "reference/reference.h"
+#include "tests/support/source_dir.h"
+#include "verify/prepare.h"
+
+namespace mbv {
+namespace {
+
+using testing::HasSubstr;
+
+Mechanism FromText(const std::string& text) {
+  LoadResult loaded = LoadModelText(text, "proof.yaml");
+  EXPECT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  return loaded.mechanism.value_or(Mechanism());
+}
+
+// A mass of 1 kg on a vertical guide, carried by a leg from a point 3 m beside it: 3, 4, 5.
+const char kLeaning[] = R"(name: leaning
+gravity: [0, 0, -10]
+world: {frames: {foot: [-3, 0, 0]}}
+bodies:
+  block: {mass: 1, inertia: [1, 1, 1]}
+joints:
+  guide: {kind: prismatic, parent: world, child: block, axis: z, guess: 4}
+drives:
+  leg: {kind: distance, from: world.foot, to: block}
+)";
+
+Motion LegMotion(Profile profile, double duration_s = 0.5) {
+  return {.duration_s = duration_s,
+          .sample_s = duration_s,
+          .commands = {{"leg", {{{Coordinate::Kind::kDrive, 0, 0}, 1.0}}, std::move(profile)}},
+          .loads = {}};
+}
+
+const ProvedValue& ValueOf(const SampleProof& sample, const std::string& channel) {
+  for (const ProvedValue& value : sample.values) {
+    if (value.channel == channel) return value;
+  }
+  ADD_FAILURE() << "no " << channel;
+  static const ProvedValue none;
+  return none;
+}
+
+TEST(Certify, EnclosesExactFractions) {
+  // L = 5 + t: z = 4, ż = L L̇/z = 5/4, z̈ = (1 − 25/16)/4 = −9/64 at the start;
+  // F = (10 + z̈) 5/4 = 3155/256, and the guide bears F 3/5 = 1893/256.
+  const Mechanism mechanism = FromText(kLeaning);
+  Motion motion = LegMotion({{ConstantTerm{5.0}, RampTerm{1.0}}});
+  const Certificate certificate = Certify(mechanism, motion, {});
+  ASSERT_EQ(certificate.samples.size(), 2u) << certificate.why_not;
+  const SampleProof& start = certificate.samples.front();
+  ASSERT_TRUE(start.proved()) << start.why_not;
+  const auto holds = [&](const std::string& channel, double exact) {
+    const ProvedValue& value = ValueOf(start, channel);
+    EXPECT_LE(value.radius, 1e-28) << channel;
+    EXPECT_NEAR(value.value, exact, value.radius) << channel << " " << value.text;
+  };
+  holds("leg.position", 5.0);
+  holds("leg.velocity", 1.0);
+  holds("leg.acceleration", 0.0);
+  holds("leg.force", 3155.0 / 256.0);
+  // Of the parent on the child: against the leg's push along x.
+  holds("guide.reaction.fx", -1893.0 / 256.0);
+  EXPECT_THAT(ValueOf(start, "leg.force").text, HasSubstr("1.2324218750000000000000000"));
+}
+
+std::vector<std::string> InverseScenarios() {
+  std::vector<std::string> files;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(SourcePath("/scenarios"))) {
+    if (entry.path().extension() != ".yaml" ||
+        entry.path().string().find("must_fail") != std::string::npos) {
+      continue;
+    }
+    const ScenarioHead head = ReadScenarioHead(entry.path().string());
+    if (head.is_scenario && !head.HasKey("study")) files.push_back(entry.path().string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// All samples of every shipped motion that is commanded, to twelve digits; the others say why.
+TEST(CertifyShipped, ProvesTwelveDigits) {
+  size_t proved = 0, shared = 0, declined = 0;
+  for (const std::string& file : InverseScenarios()) {
+    Diagnostics found;
+    const std::optional<Prepared> prepared = Prepare(file, {}, &found);
+    if (!prepared) continue;
+    const Motion& motion = prepared->scenario.motion;
+    const ReferenceRun run = RunReference(prepared->mechanisms.reference, motion);
+    const Certificate certificate =
+        Certify(prepared->mechanisms.reference, motion, {{"reference", &run.trace}});
+    if (!certificate.why_not.empty()) {
+      ++declined;
+      continue;
+    }
+    ASSERT_FALSE(certificate.samples.empty()) << file;
+    if (certificate.proved() == 0) {
+      EXPECT_THAT(certificate.samples.front().why_not, HasSubstr("share their forces")) << file;
+      ++shared;
+      continue;
+    }
+    EXPECT_EQ(certificate.proved(), certificate.samples.size()) << file;
+    ASSERT_EQ(certificate.witnesses.size(), 1u) << file;
+    const WitnessProof& reference = certificate.witnesses.front();
+    EXPECT_GE(reference.digits(), 12.0) << file;
+    EXPECT_LE(reference.reaction_error, 1e-11) << file;
+    EXPECT_LE(reference.motion_error, 1e-9) << file;
+    EXPECT_FALSE(reference.wrong) << file;
+    ++proved;
+  }
+  EXPECT_GE(proved, 98u);
+  EXPECT_LE(shared, 2u);
+  EXPECT_LE(declined, 40u);
+}
+
+// 240 bits against 113: each value of the finer one lies in the coarser enclosure.
+TEST(CertifyShipped, CoarseIntervalsHoldFineValues) {
+  size_t values = 0;
+  for (const char* name : {"spr_tripod/random", "cabin_robot/random", "scara_robot/random",
+                           "stabilizing_platform/random", "machine_five_bar/draw"}) {
+    Diagnostics found;
+    const auto prepared = Prepare(SourcePath(fmt::format("/scenarios/{}.yaml", name)), {}, &found);
+    ASSERT_TRUE(prepared.has_value()) << found.Text();
+    CertifyOptions coarse{.samples = 6}, fine{.samples = 6, .least_bits = 240};
+    const Mechanism& mechanism = prepared->mechanisms.reference;
+    const Certificate a = Certify(mechanism, prepared->scenario.motion, {}, coarse);
+    const Certificate b = Certify(mechanism, prepared->scenario.motion, {}, fine);
+    ASSERT_EQ(a.samples.size(), b.samples.size());
+    for (size_t i = 0; i < a.samples.size(); ++i) {
+      ASSERT_TRUE(a.samples[i].proved() && b.samples[i].proved()) << name;
+      EXPECT_EQ(a.samples[i].bits, 113);
+      EXPECT_EQ(b.samples[i].bits, 240);
+      ASSERT_EQ(a.samples[i].values.size(), b.samples[i].values.size());
+      for (size_t k = 0; k < a.samples[i].values.size(); ++k) {
+        const ProvedValue &x = a.samples[i].values[k], &y = b.samples[i].values[k];
+        const long double far = std::abs(std::stold(x.text) - std::stold(y.text));
+        // Long doubles keep 19 digits: what is nearer than that cannot be told apart here.
+        EXPECT_LE(far, x.radius + y.radius + 2e-19L * std::abs(std::stold(y.text))) << x.channel;
+        EXPECT_LE(y.radius, x.radius) << x.channel;
+        ++values;
+      }
+    }
+  }
+  EXPECT_GT(values, 1000u);
+}
+
+struct Case {
+  Mechanism mechanism;
+  Motion motion;
+  Trace trace;
+};
+Case FourBar() {
+  Diagnostics found;
+  auto prepared = Prepare(SourcePath("/scenarios/four_bar/turn_inverse.yaml"), {}, &found);
+  EXPECT_TRUE(prepared.has_value()) << found.Text();
+  Case made{prepared->mechanisms.reference, prepared->scenario.motion, {}};
+  made.trace = RunReference(made.mechanism, made.motion).trace;
+  return made;
+}
+WitnessProof ProofOf(const Case& of, const Mechanism& mechanism) {
+  const Certificate certificate = Certify(mechanism, of.motion, {{"analytic", &of.trace}});
+  EXPECT_EQ(certificate.proved(), certificate.samples.size());
+  EXPECT_EQ(certificate.witnesses.size(), 1u);
+  return certificate.witnesses.empty() ? WitnessProof() : certificate.witnesses.front();
+}
+
+TEST(Certify, RefutesTheThirteenthDigit) {
+  Case c = FourBar();
+  const int force = c.trace.Find(Quantity::kForce, c.mechanism.drives[0].name);
+  ASSERT_GE(force, 0);
+  EXPECT_LT(ProofOf(c, c.mechanism).force_error, 1e-13);
+  c.trace.values.col(force) *= 1.0 + 1e-12;
+  const WitnessProof off = ProofOf(c, c.mechanism);
+  EXPECT_GT(off.force_error_at_least, 0.5e-12);
+  EXPECT_LT(off.force_error, 1.5e-12);
+  EXPECT_FALSE(off.wrong);
+  c.trace.values.col(force) *= 1.0 + 1e-8;
+  EXPECT_TRUE(ProofOf(c, c.mechanism).wrong);
+}
+
+TEST(Certify, SeesEveryMassAndLength) {
+  const Case c = FourBar();
+  Mechanism heavier = c.mechanism;
+  heavier.bodies[1].mass *= 1.0 + 1e-9;
+  EXPECT_GT(ProofOf(c, heavier).force_error_at_least, 1e-11);
+  Mechanism longer = c.mechanism;
+  longer.joints[1].X_PF.translation() *= 1.0 + 1e-9;
+  EXPECT_GT(ProofOf(c, longer).force_error_at_least, 1e-11);
+  Mechanism turned = c.mechanism;
+  turned.bodies[2].I_Bcm_B *= 1.0 + 1e-6;
+  EXPECT_GT(ProofOf(c, turned).force_error_at_least, 1e-11);
+}
+
+TEST(Certify, ProvesNothingAtSingularPosesOrBeyondReach) {
+  // The block at the foot's height: the leg lies across the guide, and cannot move it.
+  const Mechanism mechanism = FromText(kLeaning);
+  for (const double leg : {3.0, 2.9}) {
+    const Certificate certificate = Certify(mechanism, LegMotion(Constant(leg)), {});
+    EXPECT_EQ(certificate.proved(), 0u) << leg;
+    ASSERT_FALSE(certificate.samples.empty());
+    EXPECT_THAT(certificate.samples.front().why_not, HasSubstr("not provable"));
+  }
+  // Hardly away from it is proved, with the distance: z = 1e-4 of 3 m.
+  const double near = std::sqrt(9.0 + 1e-8);
+  const Certificate certificate = Certify(mechanism, LegMotion(Constant(near)), {});
+  ASSERT_EQ(certificate.proved(), certificate.samples.size()) << certificate.samples[0].why_not;
+  EXPECT_NEAR(certificate.samples[0].closure_distance_low, 1e-4 / 3.0, 1e-5);
+  EXPECT_LE(certificate.samples[0].closure_distance_low,
+            certificate.samples[0].closure_distance_high);
+}
+
+TEST(Certify, TakesAnAgreementAway) {
+  RunOptions options;
+  options.after_judgement = [](const Prepared& prepared, Report* report) {
+    ASSERT_EQ(report->comparison.verdict, Verdict::kAgree);
+    // Both computed witnesses, wrong alike.
+    for (WitnessRecord& record : report->witnesses) {
+      for (const Drive& drive : prepared.base.drives) {
+        const int column = record.trace.Find(Quantity::kForce, drive.name);
+        if (column >= 0) record.trace.values.col(column) *= 1.0 + 1e-7;
+      }
+    }
+    AddCertificate(prepared, {}, report);
+  };
+  const RunOutcome outcome =
+      RunScenario(SourcePath("/scenarios/spr_tripod/default_inverse.yaml"), options);
+  EXPECT_EQ(outcome.exit_code, 1);
+  ASSERT_TRUE(outcome.report.has_value());
+  EXPECT_THAT(outcome.report->comparison.attribution.text,
+              HasSubstr("proved: analytic is off by 9."));
+  EXPECT_EQ(outcome.report->comparison.attribution.odd_one_out, "analytic");
+}
+
+TEST(Certify, LeavesAgreementsAndShowsDigits) {
+  RunOptions options;
+  options.after_judgement = [](const Prepared& prepared, Report* report) {
+    AddCertificate(prepared, {}, report);
+  };
+  const RunOutcome outcome =
+      RunScenario(SourcePath("/scenarios/spr_tripod/default_inverse.yaml"), options);
+  EXPECT_EQ(outcome.exit_code, 0);
+  ASSERT_TRUE(outcome.report.has_value());
+  EXPECT_THAT(ToTable(*outcome.report, {}), HasSubstr("rive forces proved to 1"));
+  EXPECT_THAT(ToJson(*outcome.report), HasSubstr("\"certificate\""));
+}
+
+}  // namespace
+}  // namespace mbv
