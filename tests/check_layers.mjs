@@ -18,6 +18,7 @@ const LIBRARIES = {
   'pybind11': { headers: ['pybind11/'], target: 'pybind11::module' },
   'SQLite': { headers: ['sqlite3'], target: 'SQLite::SQLite3' },
   'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },
+  'MPFI': { headers: ['boost/multiprecision/mpfi'], target: 'MPFI::MPFI' },
   'KLU': { headers: ['suitesparse/'], target: 'KLU::KLU' },
   'libzip': { headers: ['zip.h'], target: 'PkgConfig::LIBZIP' },
   'libpng': { headers: ['png.h'], target: 'PNG::PNG' },
