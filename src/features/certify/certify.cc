@@ -311,11 +311,16 @@ class Prover {
   }
 
   void MakeEquations(const Start& start) {
-    asked_.clear(), driven_.clear();
-    for (Equation<T>& equation : model_.Closures(start.coupled)) {
-      asked_.push_back({std::move(equation)});
+    // What cut joints lock is the same for all samples, couplings count turns.
+    if (asked_.empty() || !mechanism().couplings.empty()) {
+      asked_.clear();
+      for (Equation<T>& equation : model_.Closures(start.coupled)) {
+        asked_.push_back({std::move(equation)});
+      }
+      closures_ = asked_.size();
     }
-    closures_ = asked_.size();
+    asked_.resize(closures_);
+    driven_.clear();
     const size_t drives = mechanism().drives.size(), elements = mechanism().elements.size();
     const auto turn = [&](size_t k) {
       return elements + k < start.turns.size() ? start.turns[elements + k] : 0.0;
@@ -368,20 +373,33 @@ class Prover {
     return model_.IsLengthCoordinate(static_cast<int>(j)) ? length_ : 1.0;
   }
 
-  // Rows of equations by the tree's coordinates. `turned`: of spins also the derivative of their
-  // turn, which counts for positions.
-  [[nodiscard]] Rows Jacobian(const std::vector<size_t>& rows, const std::vector<T>& q,
-                              const typename Model<T>::Poses& bodies, bool turned) const {
-    const std::vector<Virtual> motions = model_.VirtualAt(q, bodies, false);
+  using Wrenches = std::vector<std::vector<Wrench<T>>>;
+  // Of all equations, of those in `rows` alone.
+  [[nodiscard]] Wrenches WrenchesOf(const std::vector<size_t>& rows,
+                                    const typename Model<T>::Poses& bodies) const {
+    Wrenches wrenches(asked_.size());
+    typename Model<T>::Seeds seeds;
+    for (const size_t i : rows) {
+      wrenches[i] = model_.WrenchesAt(asked_[i].equation, bodies, &seeds);
+    }
+    return wrenches;
+  }
+  // Rows of equations by the tree's coordinates. `turned`: poses for which, of spins, also the
+  // derivative of their turn counts; null: none.
+  [[nodiscard]] Rows Jacobian(const std::vector<size_t>& rows, const std::vector<Virtual>& motions,
+                              const Wrenches& wrenches,
+                              const typename Model<T>::Poses* turned) const {
     Rows J(rows.size());
     for (size_t i = 0; i < rows.size(); ++i) {
       const Equation<T>& equation = asked_[rows[i]].equation;
-      const std::vector<Wrench<T>> wrenches = model_.WrenchesAt(equation, bodies);
+      const std::vector<Wrench<T>>& exerted = wrenches[rows[i]];
       std::vector<Wrench<T>> turn;
-      if (turned && equation.spin >= 0) turn = {model_.SpinTurnWrench(equation.spin, bodies)};
-      for (size_t j = 0; j < motions.size(); ++j) {
-        if (!Moves(motions[j], wrenches)) continue;
-        T slope = model_.Along(motions[j], wrenches);
+      if (turned != nullptr && equation.spin >= 0) {
+        turn = {model_.SpinTurnWrench(equation.spin, *turned)};
+      }
+      for (size_t j = 0; j < static_cast<size_t>(model_.coordinates()); ++j) {
+        if (!Moves(motions[j], exerted)) continue;
+        T slope = model_.Along(motions[j], exerted);
         if (!turn.empty()) slope = mp::hull(slope, model_.Along(motions[j], turn));
         J[i].push_back({static_cast<int>(j), std::move(slope)});
       }
@@ -410,7 +428,10 @@ class Prover {
     std::vector<size_t> all(asked_.size());
     for (size_t i = 0; i < all.size(); ++i) all[i] = i;
     const auto columns = static_cast<Eigen::Index>(model_.coordinates());
-    MatX J = Approximate(Jacobian(all, q_, model_.PosesAt(q_), false), columns);
+    const typename Model<T>::Poses bodies = model_.PosesAt(q_);
+    MatX J = Approximate(
+        Jacobian(all, model_.VirtualAt(q_, bodies, false), WrenchesOf(all, bodies), nullptr),
+        columns);
     for (size_t i = 0; i < all.size(); ++i) {
       J.row(static_cast<Eigen::Index>(i)) *= RowScale(asked_[i].equation);
     }
@@ -443,7 +464,9 @@ class Prover {
     for (const double radius : {1e-6, 1e-8, 1e-10, 1e-12}) {
       std::vector<T> box = start;
       for (size_t j = 0; j < n; ++j) box[j] = system_->Widened(start[j], j, radius);
-      system_->Set(Jacobian(rows_, box, model_.PosesAt(box), true));
+      const typename Model<T>::Poses bodies = model_.PosesAt(box);
+      system_->Set(Jacobian(rows_, model_.VirtualAt(box, bodies, false), WrenchesOf(rows_, bodies),
+                            &bodies));
       if (!system_->Invert()) return kSingular;
       system_->Check();
       if (!system_->regular()) continue;
@@ -468,14 +491,22 @@ class Prover {
         proof->left_open = std::max(proof->left_open, Size(open));
       }
     }
-    system_->Set(Jacobian(rows_, q_, bodies_, false));
+    std::vector<size_t> needed = rows_;
+    for (size_t k = 0; k < closures_; ++k) {
+      if (taken.count(k) == 0) needed.push_back(k);
+    }
+    std::sort(needed.begin(), needed.end());
+    wrenches_ = WrenchesOf(needed, bodies_);
+    virtual_ = model_.VirtualAt(q_, bodies_, true);
+    system_->Set(Jacobian(rows_, virtual_, wrenches_, nullptr));
     system_->Check();
     proof->closure_distance_low = system_->distance_low();
     proof->closure_distance_high = system_->distance_high();
     return system_->regular() ? "" : kSingular;
   }
 
-  // Newton's method to the last digits; |R residual| then.
+  // Newton's method to the last digits but a few; |R residual| then.
+  static constexpr double kEnough = std::is_same_v<T, exact::Fine> ? 1e-31 : 1e-69;
   bool Refine(VecX* reached) {
     double last = kInfinity;
     for (int k = 0;; ++k) {
@@ -483,7 +514,7 @@ class Prover {
       *reached = system_->Reached(residual);
       const double now = reached->size() == 0 ? 0.0 : reached->maxCoeff();
       if (!std::isfinite(now)) return false;
-      if (now == 0.0 || !(now < 0.5 * last) || k == 20) return true;
+      if (now < kEnough || !(now < 0.5 * last) || k == 20) return true;
       last = now;
       system_->Correct(residual, &q_);
     }
@@ -522,8 +553,7 @@ class Prover {
                                         : model_.ValueAt(of.equation, motions_, &last).a);
     }
     const std::vector<T> acceleration = system_->Solve(asked);
-    for (size_t j = 0; j < q_.size(); ++j) q[j].a = acceleration[j];
-    motions_ = model_.MotionsAt(q);
+    model_.Accelerate(virtual_, acceleration, &motions_);
   }
 
   // (2) of exact_model.h.
@@ -531,7 +561,7 @@ class Prover {
     carried_ = model_.Required(motions_);
     std::string trouble = Apply(start);
     if (!trouble.empty()) return trouble;
-    const std::vector<Virtual> motions = model_.VirtualAt(q_, bodies_, true);
+    const std::vector<Virtual>& motions = virtual_;
     MakeColumns();
     const size_t n = motions.size();
     if (columns_.empty() && n > 0) {
@@ -576,21 +606,20 @@ class Prover {
   struct Force {
     std::vector<Wrench<T>> wrenches;
     bool length = true;
-    bool needed = false;  ///< of a drive or a prescribed joint
   };
   void MakeColumns() {
     forces_.clear();
     const std::vector<bool> transmitting = model_.Transmitting();
-    const auto add = [&](const Equation<T>& equation, bool needed) {
-      forces_.push_back({model_.WrenchesAt(equation, bodies_), equation.length(), needed});
+    const auto add = [&](const Equation<T>& equation) {
+      forces_.push_back({model_.WrenchesAt(equation, bodies_), equation.length()});
     };
     for (size_t k = 0; k < closures_; ++k) {
-      if (transmitting[k]) add(asked_[k].equation, false);
+      if (transmitting[k]) forces_.push_back({wrenches_[k], asked_[k].equation.length()});
     }
     transmitting_ = forces_.size();
-    for (const Equation<T>& equation : driven_) add(equation, true);
+    for (const Equation<T>& equation : driven_) add(equation);
     for (size_t s = 0; s < model_.spins().size(); ++s) {
-      add(Model<T>::SpinEquation(static_cast<int>(s)), true);
+      add(Model<T>::SpinEquation(static_cast<int>(s)));
     }
   }
 
@@ -777,6 +806,8 @@ class Prover {
   bool reactions_unique_ = false;
   std::optional<System> system_;
   typename Model<T>::Poses bodies_;
+  Wrenches wrenches_;             ///< of asked_, there
+  std::vector<Virtual> virtual_;  ///< of the tree's coordinates, then released ones
   typename Model<T>::Motions motions_;
   std::vector<Six<T>> carried_;  ///< required less applied, per body
   std::vector<Force> forces_;

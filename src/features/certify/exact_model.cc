@@ -402,8 +402,30 @@ S Model<T>::ValueAt(const Equation<T>& equation, const std::vector<Frame<S>>& bo
 }
 
 template <typename T>
-std::vector<Wrench<T>> Model<T>::WrenchesAt(const Equation<T>& equation,
-                                            const Poses& bodies) const {
+void Model<T>::Seed(size_t pair, const Poses& bodies, Seeds* seeds) const {
+  seeds->pair = pair;
+  seeds->F = ParentFrame(pair, bodies), seeds->M = ChildFrame(pair, bodies);
+  const Matrix<T> R_FW = Transposed(seeds->F.R);
+  const Vector<T> d = R_FW * (seeds->M.p - seeds->F.p);
+  const Matrix<T> R = R_FW * seeds->M.R;
+  for (size_t i = 0; i < 3; ++i) {
+    seeds->d[i] = Tangent<T>(d[i]);
+    seeds->d[i].g[3 + i] = T(1);
+    for (size_t k = 0; k < 3; ++k) seeds->R(i, k) = Tangent<T>(R(i, k));
+  }
+  // A turn about e_i takes a column c along e_i × c.
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t j = (i + 1) % 3, k = (i + 2) % 3;
+    for (size_t c = 0; c < 3; ++c) {
+      seeds->R(j, c).g[i] = -R(k, c);
+      seeds->R(k, c).g[i] = R(j, c);
+    }
+  }
+}
+
+template <typename T>
+std::vector<Wrench<T>> Model<T>::WrenchesAt(const Equation<T>& equation, const Poses& bodies,
+                                            Seeds* seeds) const {
   std::vector<Wrench<T>> wrenches;
   if (equation.spin >= 0) {
     const Spin& spin = spins_[static_cast<size_t>(equation.spin)];
@@ -413,30 +435,17 @@ std::vector<Wrench<T>> Model<T>::WrenchesAt(const Equation<T>& equation,
     wrenches.push_back(std::move(wrench));
     return wrenches;
   }
+  Seeds own;
+  if (seeds == nullptr) seeds = &own;
   for (const auto& term : equation.terms) {
-    const Pair& at = pairs_[term.scalar.frames];
-    const Frame<T> X_FM = Between(term.scalar.frames, bodies);
-    Vector<Tangent<T>> d;
-    Matrix<Tangent<T>> R;
-    for (size_t i = 0; i < 3; ++i) {
-      d[i] = Tangent<T>(X_FM.p[i]);
-      d[i].g[3 + i] = T(1);
-      for (size_t k = 0; k < 3; ++k) R(i, k) = Tangent<T>(X_FM.R(i, k));
-    }
-    // A turn about e_i takes a column c along e_i × c.
-    for (size_t i = 0; i < 3; ++i) {
-      for (size_t k = 0; k < 3; ++k) {
-        const Vector<T> turned = Cross(Axis<T>(i), Column(X_FM.R, k));
-        for (size_t l = 0; l < 3; ++l) R(l, k).g[i] = turned[l];
-      }
-    }
-    const Tangent<T> x = term.scalar.Of(d, R, term.near);
+    const size_t pair = term.scalar.frames;
+    if (seeds->pair != pair) Seed(pair, bodies, seeds);
+    const Tangent<T> x = term.scalar.Of(seeds->d, seeds->R, term.near);
     const Tangent<T> y = Polynomial(term.polynomial, x);
-    const Frame<T> F = ParentFrame(term.scalar.frames, bodies);
-    const Frame<T> M = ChildFrame(term.scalar.frames, bodies);
-    Wrench<T> wrench{at.parent, at.child, {}};
-    wrench.on_child.f = F.R * Vector<T>{{y.g[3], y.g[4], y.g[5]}};
-    wrench.on_child.m = F.R * Vector<T>{{y.g[0], y.g[1], y.g[2]}} + Cross(M.p, wrench.on_child.f);
+    Wrench<T> wrench{pairs_[pair].parent, pairs_[pair].child, {}};
+    wrench.on_child.f = seeds->F.R * Vector<T>{{y.g[3], y.g[4], y.g[5]}};
+    wrench.on_child.m =
+        seeds->F.R * Vector<T>{{y.g[0], y.g[1], y.g[2]}} + Cross(seeds->M.p, wrench.on_child.f);
     wrenches.push_back(std::move(wrench));
   }
   return wrenches;
@@ -510,6 +519,31 @@ std::vector<typename Model<T>::Virtual> Model<T>::VirtualAt(const std::vector<T>
   }
   motions.insert(motions.end(), more.begin(), more.end());
   return motions;
+}
+
+template <typename T>
+void Model<T>::Accelerate(const std::vector<Virtual>& motions, const std::vector<T>& accelerations,
+                          Motions* bodies) const {
+  std::vector<Six<T>> twists(bodies->size());
+  for (const TreeJoint& joint : tree_) {
+    const auto b = static_cast<size_t>(joint.outboard);
+    Six<T>& twist = twists[b];
+    twist = twists[static_cast<size_t>(joint.inboard)];
+    for (const std::vector<Step>* steps : {&joint.slides, &joint.turns}) {
+      for (const Step& step : *steps) {
+        const auto c = static_cast<size_t>(step.coordinate);
+        twist = twist + Times(accelerations[c], motions[c].twist);
+      }
+    }
+    Frame<Series<T>>& X = (*bodies)[b];
+    const Vector<T> p = twist.f + Cross(twist.m, Each(X.p, &Series<T>::v));
+    const Matrix<T> R = Each(X.R, &Series<T>::v);
+    for (size_t i = 0; i < 3; ++i) {
+      X.p[i].a += p[i];
+      const Vector<T> column = Cross(twist.m, Column(R, i));
+      for (size_t k = 0; k < 3; ++k) X.R(k, i).a += column[k];
+    }
+  }
 }
 
 template <typename T>

@@ -28,6 +28,7 @@
 #include <vector>
 
 #include "base/types.h"
+#include "features/certify/exact_numbers.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/mechanism.h"
@@ -196,9 +197,27 @@ struct Matrix {
 template <typename A, typename B>
 using ProductOf = std::decay_t<decltype(std::declval<A>() * std::declval<B>())>;
 
+// x0 b0 + x1 b1 + x2 b2; of constants, many are 0.
+template <typename A, typename B>
+ProductOf<A, B> Combined(const A& x0, const A& x1, const A& x2, const Vector<B>& b) {
+  if constexpr (std::is_same_v<B, std::decay_t<decltype(ValueOf(b[0]))>>) {
+    const std::array<const A*, 3> x = {&x0, &x1, &x2};
+    ProductOf<A, B> sum(B(0));
+    for (size_t i = 0; i < 3; ++i) {
+      if (!IsZero(b[i])) sum = sum + *x[i] * b[i];
+    }
+    return sum;
+  } else {
+    return x0 * b[0] + x1 * b[1] + x2 * b[2];
+  }
+}
 template <typename A, typename B>
 ProductOf<A, B> Dot(const Vector<A>& a, const Vector<B>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  if constexpr (std::is_same_v<A, std::decay_t<decltype(ValueOf(a[0]))>>) {
+    return Combined(b[0], b[1], b[2], a);
+  } else {
+    return Combined(a[0], a[1], a[2], b);
+  }
 }
 template <typename A, typename B>
 Vector<ProductOf<A, B>> Cross(const Vector<A>& a, const Vector<B>& b) {
@@ -220,7 +239,7 @@ template <typename A, typename B>
 Vector<ProductOf<A, B>> operator*(const Matrix<A>& R, const Vector<B>& v) {
   Vector<ProductOf<A, B>> w;
   for (size_t i = 0; i < 3; ++i) {
-    w[i] = R(i, 0) * v[0] + R(i, 1) * v[1] + R(i, 2) * v[2];
+    w[i] = Combined(R(i, 0), R(i, 1), R(i, 2), v);
   }
   return w;
 }
@@ -333,10 +352,13 @@ Matrix<S> Turn(const Vector<T>& axis, const S& angle) {
   const S u = S(T(1)) - c;
   Matrix<S> R;
   for (size_t i = 0; i < 3; ++i) {
-    for (size_t j = 0; j < 3; ++j) R(i, j) = u * T(axis[i] * axis[j]);
+    for (size_t j = 0; j < 3; ++j) {
+      R(i, j) = IsZero(axis[i]) || IsZero(axis[j]) ? S(T(0)) : u * T(axis[i] * axis[j]);
+    }
     R(i, i) = R(i, i) + c;
   }
   for (size_t i = 0; i < 3; ++i) {
+    if (IsZero(axis[i])) continue;
     const size_t k = (i + 1) % 3, l = (i + 2) % 3;
     R(l, k) = R(l, k) + s * axis[i];
     R(k, l) = R(k, l) - s * axis[i];
@@ -422,6 +444,14 @@ class Model {
     Frame<S> X_FM;
   };
 
+  /// The same with what wrenches are made of.
+  struct Seeds {
+    size_t pair = static_cast<size_t>(-1);
+    Frame<T> F, M;
+    Vector<Tangent<T>> d;
+    Matrix<Tangent<T>> R;
+  };
+
   explicit Model(const Mechanism& mechanism);
 
   [[nodiscard]] int coordinates() const { return coordinates_; }
@@ -453,8 +483,8 @@ class Model {
   template <typename S>
   [[nodiscard]] S ValueAt(const Equation<T>& equation, const std::vector<Frame<S>>& bodies,
                           Last<S>* last = nullptr) const;
-  [[nodiscard]] std::vector<Wrench<T>> WrenchesAt(const Equation<T>& equation,
-                                                  const Poses& bodies) const;
+  [[nodiscard]] std::vector<Wrench<T>> WrenchesAt(const Equation<T>& equation, const Poses& bodies,
+                                                  Seeds* seeds = nullptr) const;
   /// Of a spin the turn about its line, for the position: 0 at the start.
   [[nodiscard]] Wrench<T> SpinTurnWrench(int spin, const Poses& bodies) const;
   /// Rate of a spin's n·ω where accelerations are those of the motion.
@@ -469,6 +499,9 @@ class Model {
   /// transmit a force only lock.
   [[nodiscard]] std::vector<Virtual> VirtualAt(const std::vector<T>& q, const Poses& bodies,
                                                bool released) const;
+  /// Adds what accelerations of the tree's coordinates do.
+  void Accelerate(const std::vector<Virtual>& motions, const std::vector<T>& accelerations,
+                  Motions* bodies) const;
   /// s_j·(what an equation exerts): its derivative by the coordinate.
   [[nodiscard]] T Along(const Virtual& motion, const std::vector<Wrench<T>>& wrenches) const;
   [[nodiscard]] bool IsBeyond(int body, int outboard) const {
@@ -554,6 +587,7 @@ class Model {
   [[nodiscard]] Frame<S> ChildFrame(size_t pair, const std::vector<Frame<S>>& bodies) const {
     return pairs_[pair].X_CM.Behind(bodies[static_cast<size_t>(pairs_[pair].child)]);
   }
+  void Seed(size_t pair, const Poses& bodies, Seeds* seeds) const;
   template <typename S>
   const Frame<S>& Shared(size_t pair, const std::vector<Frame<S>>& bodies, Last<S>* last) const {
     if (last->pair != pair) last->X_FM = Between(pair, bodies), last->pair = pair;

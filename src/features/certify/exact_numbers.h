@@ -11,4 +11,10 @@ using Enclosure = mp::number<mp::mpfi_float_backend<kDigits>, mp::et_off>;
 using Fine = Enclosure<34>;
 using Finest = Enclosure<73>;
 
+/// Products with it need not be formed.
+template <unsigned kDigits>
+bool IsZero(const Enclosure<kDigits>& x) {
+  return mpfi_is_zero(x.backend().data()) != 0;
+}
+
 }  // namespace mbv::exact
