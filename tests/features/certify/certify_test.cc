@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "features/certify/certificate_report.h"
+#include "features/certify/exact_numbers.h"
 #include "features/run/run_scenario.h"
 #include "model_file/load_model.h"
 #include "reference/reference.h"
@@ -129,12 +130,14 @@ TEST(CertifyShipped, ProvesTwelveDigits) {
 // 240 bits against 113: each value of the finer one lies in the coarser enclosure.
 TEST(CertifyShipped, CoarseIntervalsHoldFineValues) {
   size_t values = 0;
-  for (const char* name : {"spr_tripod/random", "cabin_robot/random", "scara_robot/random",
-                           "stabilizing_platform/random", "machine_five_bar/draw"}) {
+  for (const char* name :
+       {"spr_tripod/random", "cabin_robot/random", "scara_robot/random",
+        "stabilizing_platform/random", "stabilizing_platform/sea_state", "spr_tripod/default",
+        "scara_robot/default", "stewart/legs", "machine_five_bar/draw"}) {
     Diagnostics found;
     const auto prepared = Prepare(SourcePath(fmt::format("/scenarios/{}.yaml", name)), {}, &found);
     ASSERT_TRUE(prepared.has_value()) << found.Text();
-    CertifyOptions coarse{.samples = 6}, fine{.samples = 6, .least_bits = 240};
+    CertifyOptions coarse{.samples = 25}, fine{.samples = 25, .least_bits = 240};
     const Mechanism& mechanism = prepared->mechanisms.reference;
     const Certificate a = Certify(mechanism, prepared->scenario.motion, {}, coarse);
     const Certificate b = Certify(mechanism, prepared->scenario.motion, {}, fine);
@@ -146,15 +149,15 @@ TEST(CertifyShipped, CoarseIntervalsHoldFineValues) {
       ASSERT_EQ(a.samples[i].values.size(), b.samples[i].values.size());
       for (size_t k = 0; k < a.samples[i].values.size(); ++k) {
         const ProvedValue &x = a.samples[i].values[k], &y = b.samples[i].values[k];
-        const long double far = std::abs(std::stold(x.text) - std::stold(y.text));
-        // Long doubles keep 19 digits: what is nearer than that cannot be told apart here.
-        EXPECT_LE(far, x.radius + y.radius + 2e-19L * std::abs(std::stold(y.text))) << x.channel;
+        const exact::Finest far =
+            abs(exact::Finest(x.text.c_str()) - exact::Finest(y.text.c_str()));
+        EXPECT_LE(boost::multiprecision::lower(far), x.radius + y.radius) << x.channel;
         EXPECT_LE(y.radius, x.radius) << x.channel;
         ++values;
       }
     }
   }
-  EXPECT_GT(values, 1000u);
+  EXPECT_GT(values, 10000u);
 }
 
 struct Case {
