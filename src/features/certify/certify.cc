@@ -270,6 +270,8 @@ class Prover {
 
   /// Whether reactions of what was proved are left open by statics.
   [[nodiscard]] bool reactions_open() const { return !columns_.empty() && !reactions_unique_; }
+  /// Whether drives share their forces.
+  [[nodiscard]] bool shared() const { return shared_; }
 
   SampleProof Prove(const Start& start) {
     SampleProof proof;
@@ -573,7 +575,6 @@ class Prover {
       row_scale.push_back(IsSlide(j) ? 1.0 : 1.0 / length_);
     }
     for (const size_t k : columns_) column_scale.push_back(forces_[k].length ? 1.0 : length_);
-    System system(row_scale, column_scale);
     Rows A(n);
     std::map<int, Six<T>> beyond;
     std::vector<T> work(n);
@@ -587,6 +588,8 @@ class Prover {
         A[j].push_back({static_cast<int>(k), model_.Along(motions[j], wrenches)});
       }
     }
+    if (shared_) Share(&A, &work, &row_scale, &column_scale);
+    System system(row_scale, column_scale);
     system.Set(std::move(A));
     if (!system.Invert()) return kForcesSingular;
     system.Check();
@@ -594,7 +597,33 @@ class Prover {
     proof->force_distance_low = system.distance_low();
     proof->force_distance_high = system.distance_high();
     force_ = system.Solve(work);
+    force_.resize(columns_.size());
     return "";
+  }
+
+  // More drives than are needed: of all forces x that A x = b allows, those of drives and prescribed
+  // joints of least norm, moments divided by the characteristic length. With multipliers μ,
+  //   A x = b,  W x − Aᵀ μ = 0,  W: 1 (1/L² of moments) of what counts, 0 of what does not
+  void Share(Rows* A, std::vector<T>* work, std::vector<double>* row_scale,
+             std::vector<double>* column_scale) const {
+    const size_t n = A->size(), forces = columns_.size();
+    const T L(CharacteristicLength(mechanism()));
+    Rows stationary(forces);
+    for (size_t k = 0; k < forces; ++k) {
+      const Force& force = forces_[columns_[k]];
+      if (columns_[k] < transmitting_ || columns_[k] >= transmitting_ + driven_.size()) continue;
+      stationary[k].push_back({static_cast<int>(k), force.length ? T(1) : T(1 / (L * L))});
+    }
+    for (size_t j = 0; j < n; ++j) {
+      for (const auto& entry : (*A)[j]) {
+        stationary[static_cast<size_t>(entry.column)].push_back(
+            {static_cast<int>(forces + j), T(-entry.value)});
+      }
+    }
+    A->insert(A->end(), stationary.begin(), stationary.end());
+    work->resize(n + forces, T(0));
+    for (size_t k = 0; k < forces; ++k) row_scale->push_back((*column_scale)[k]);
+    for (size_t j = 0; j < n; ++j) column_scale->push_back((*row_scale)[j]);
   }
 
   [[nodiscard]] bool IsSlide(size_t virtual_motion) const {
@@ -638,11 +667,11 @@ class Prover {
     std::vector<size_t> columns = choice.Choose(A.topRows(split));
     reactions_unique_ = columns.size() == transmitting_;
     const std::vector<size_t> needed = choice.Choose(A.bottomRows(A.rows() - split));
-    for (const size_t k : needed) columns.push_back(transmitting_ + k);
-    if (needed.size() != forces_.size() - transmitting_) {
-      return "not provable: the drives share their forces, statics leaves a choice";
-    }
-    if (static_cast<Eigen::Index>(columns.size()) != n) return kForcesSingular;
+    if (static_cast<Eigen::Index>(columns.size() + needed.size()) != n) return kForcesSingular;
+    // All drives act, also those that are more than are needed.
+    for (size_t k = transmitting_; k < forces_.size(); ++k) columns.push_back(k);
+    shared_ = columns.size() > static_cast<size_t>(n);
+    if (shared_) reactions_unique_ = false;
     columns_ = std::move(columns);
     return "";
   }
@@ -657,11 +686,35 @@ class Prover {
     }
   }
 
+  // An expression is a function of doubles: what it gives at the doubles nearest to its inputs counts
+  // as exact.
+  [[nodiscard]] double Followed(const StateFunction& function, const Start& start) const {
+    std::vector<double> inputs;
+    for (const StateFunction::Input& input : function.inputs) {
+      const auto i = static_cast<size_t>(input.coordinate.index);
+      const size_t drives = mechanism().drives.size();
+      const bool drive = input.coordinate.kind == Coordinate::Kind::kDrive;
+      const bool driven = drive || input.coordinate.kind == Coordinate::Kind::kPrescribed;
+      const size_t turn = mechanism().elements.size() + (drive ? i : drives + i);
+      const double near = driven && turn < start.turns.size() ? start.turns[turn] : input.near;
+      const Series<T> x = model_.ValueAt(model_.CoordinateEquation(input.coordinate, near), motions_);
+      inputs.push_back(Nearest(input.rate ? x.r : x.v));
+    }
+    return function.value(start.time_s, inputs);
+  }
+
   // Loads, springs and elements; gravity's compensation that drives exert.
   std::string Apply(const Start& start) {
     for (const LoadSample& load : start.command.loads) {
       const auto b = static_cast<size_t>(load.body);
       exact::Vector<T> f = exact::Lifted<T>(load.force), m = exact::Lifted<T>(load.moment);
+      if (load.load != nullptr) {
+        for (const Load::Following& part : load.load->following) {
+          const auto c = static_cast<size_t>(part.component);
+          T& component = c < 3 ? f[c] : m[c - 3];
+          component += T(Followed(part.function, start));
+        }
+      }
       if (load.in_body_axes) f = bodies_[b].R * f, m = bodies_[b].R * m;
       const exact::Vector<T> at = bodies_[b].p + bodies_[b].R * exact::Lifted<T>(load.p_BoQ_B);
       carried_[b] = carried_[b] - Six<T>{m + Cross(at, f), f};
@@ -803,7 +856,7 @@ class Prover {
   size_t closures_ = 0, closure_rank_ = 0, transmitting_ = 0;
   std::vector<Equation<T>> driven_, element_equations_;
   std::vector<size_t> rows_, columns_;  ///< of asked_, of forces_
-  bool reactions_unique_ = false;
+  bool reactions_unique_ = false, shared_ = false;
   std::optional<System> system_;
   typename Model<T>::Poses bodies_;
   Wrenches wrenches_;             ///< of asked_, there
@@ -817,18 +870,10 @@ class Prover {
 // Why a mechanism in motion is not served.
 std::string WhyNotServed(const Mechanism& mechanism, const Motion& motion) {
   if (motion.free()) return "a free motion: forces are given, and motions are integrated";
-  for (const Load& load : motion.loads) {
-    if (!load.following.empty()) {
-      return fmt::format("load '{}' is an expression, which is evaluated in doubles", load.name);
-    }
-  }
   for (const ForceElement& element : mechanism.elements) {
     const auto* friction = std::get_if<FrictionLaw>(&element.law);
     if (friction != nullptr && friction->coefficient > 0.0) {
       return Described(mechanism, element) + " depends on the joint's load";
-    }
-    if (element.bushing >= 0 && element.coordinate >= 3) {
-      return Described(mechanism, element) + " acts along a rotation vector";
     }
   }
   return "";
@@ -1087,6 +1132,15 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
   if (fine.reactions_open()) {
     certificate.left_out.emplace_back(
         "reactions are not proved: statics leaves a choice among those of redundant constraints");
+  }
+  if (fine.shared()) {
+    certificate.left_out.emplace_back(
+        "drives share their forces: those of least norm are proved, as the reference takes them");
+  }
+  for (const Load& load : motion.loads) {
+    if (load.following.empty()) continue;
+    certificate.left_out.push_back(fmt::format(
+        "load '{}' is an expression: its own rounding, in doubles, is not in the bounds", load.name));
   }
   certificate.left_out.emplace_back(
       "which of several assembly modes is meant: the one of the reference's pose is proved");

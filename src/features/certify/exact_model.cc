@@ -238,7 +238,9 @@ Equation<T> Model<T>::ElementEquation(const ForceElement& element, double near) 
   }
   Scalar<T> scalar;
   scalar.frames = bushing_pair_[static_cast<size_t>(element.bushing)];
-  scalar.f = Axis<T>(static_cast<size_t>(element.coordinate));
+  scalar.length = element.coordinate < 3;
+  if (!scalar.length) scalar.kind = Scalar<T>::Kind::kRotationVector;
+  scalar.f = Axis<T>(static_cast<size_t>(element.coordinate % 3));
   Equation<T> equation;
   equation.terms.push_back({scalar, {T(1)}, NearAngle<T>()});
   return equation;

@@ -180,6 +180,35 @@ S Angle(const S& s, const S& c, const NearAngle<T>& near) {
   return turn + S(near.angle);
 }
 
+/// θ/sin θ as a function of z = sin²θ, |θ| < π/2: a series near 0, whose rest from the N-th term on
+/// is below N² z^(N−2) with two derivatives.
+template <typename S>
+S AngleOverSine(const S& z) {
+  using std::asin, std::pow, std::sqrt;
+  using T = std::decay_t<decltype(ValueOf(z))>;
+  const T& x = ValueOf(z);
+  if (AtMost(x, 1.0 / 16.0)) {
+    constexpr int kTerms = 80;
+    T f(0), f1(0), f2(0), a(1), power(1), power1(0), power2(0);  // a zⁿ: a = (2n)!/(4ⁿ n!² (2n+1))
+    T binomial(1);
+    for (int n = 0; n < kTerms; ++n) {
+      a = binomial / (2 * n + 1);
+      f += a * power, f1 += a * power1, f2 += a * power2;
+      power2 = 2 * power1 + x * power2;
+      power1 = power + x * power1;
+      power = power * x;
+      binomial = binomial * (2 * n + 1) / (2 * n + 2);
+    }
+    const T rest = Symmetric<T>(1e4 * std::pow(1.0 / 16.0, kTerms - 2));
+    return Chain(z, T(f + rest), T(f1 + rest), T(f2 + rest));
+  }
+  const T root = sqrt(x), cosine = sqrt(T(1 - x));
+  const T f = asin(root) / root;
+  const T f1 = (1 / cosine - f) / (2 * x);
+  const T f2 = (1 / (2 * cosine * cosine * cosine) - 3 * f1) / (2 * x);
+  return Chain(z, f, f1, f2);
+}
+
 // Vectors and matrices.
 
 template <typename S>
@@ -371,7 +400,16 @@ Matrix<S> Turn(const Vector<T>& axis, const S& angle) {
 /// A function of the relative pose (d, R) of M in F, in F's axes.
 template <typename T>
 struct Scalar {
-  enum class Kind { kSlide, kCosine, kDistance, kAngle, kRoll, kPitch, kYaw };
+  enum class Kind {
+    kSlide,
+    kCosine,
+    kDistance,
+    kAngle,
+    kRoll,
+    kPitch,
+    kYaw,
+    kRotationVector,  ///< f·log R, |log R| < π/2
+  };
   Kind kind = Kind::kSlide;
   size_t frames = 0;   ///< index of the pair
   Vector<T> f{}, m{};  ///< kSlide: f·d;  kCosine, and the sine of kAngle: f·R m
@@ -396,6 +434,10 @@ struct Scalar {
         return Angle(S(-R(2, 0)), Root(R(0, 0) * R(0, 0) + R(1, 0) * R(1, 0)), near);
       case Kind::kYaw:
         return Angle(R(1, 0), R(0, 0), near);
+      case Kind::kRotationVector: {
+        const Vector<S> sine = Times(T(T(1) / 2), Vee(R) - Vee(Transposed(R)));
+        return AngleOverSine(Dot(sine, sine)) * Dot(f, sine);
+      }
     }
     return S(T(0));
   }

@@ -16,5 +16,15 @@ template <unsigned kDigits>
 bool IsZero(const Enclosure<kDigits>& x) {
   return mpfi_is_zero(x.backend().data()) != 0;
 }
+/// Whether all that it holds is no larger.
+template <unsigned kDigits>
+bool AtMost(const Enclosure<kDigits>& x, double bound) {
+  return mpfi_cmp_d(x.backend().data(), bound) <= 0;
+}
+/// [−radius, radius]
+template <typename T>
+T Symmetric(double radius) {
+  return mp::hull(T(-radius), T(radius));
+}
 
 }  // namespace mbv::exact
