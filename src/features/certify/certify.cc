@@ -561,6 +561,7 @@ class Prover {
   // (2) of exact_model.h.
   std::string FindForces(const Start& start, SampleProof* proof) {
     carried_ = model_.Required(motions_);
+    loaded_.clear();
     std::string trouble = Apply(start);
     if (!trouble.empty()) return trouble;
     const std::vector<Virtual>& motions = virtual_;
@@ -598,11 +599,94 @@ class Prover {
     proof->force_distance_high = system.distance_high();
     force_ = system.Solve(work);
     force_.resize(columns_.size());
-    return "";
+    return loaded_.empty() ? "" : AddLoadFriction(system, motions);
   }
 
-  // More drives than are needed: of all forces x that A x = b allows, those of drives and prescribed
-  // joints of least norm, moments divided by the characteristic length. With multipliers μ,
+  // Friction F_d = −s_d μ_d r_d n_d by the loads n_e across the axes of joints. Forces depend on it
+  // linearly, so that with p_e the load without it and P_ed of a unit force,
+  //   n_e = |p_e + Σ_d F_d P_ed| =: g_e(n)
+  // which contracts by q = max_e Σ_d |P_ed| μ_d r_d: |n − ñ| ≤ |g(ñ) − ñ| / (1 − q) where q < 1.
+  struct Loaded {
+    size_t joint = 0;
+    T slope;  ///< F_d / n_d
+    std::vector<Wrench<T>> wrenches;
+  };
+  std::string AddLoadFriction(const System& system, const std::vector<Virtual>& motions) {
+    if (!reactions_unique_) {
+      return "not provable: redundant constraints share the load of a joint with friction by load";
+    }
+    const size_t n = loaded_.size();
+    std::vector<std::vector<T>> response(n);
+    std::vector<std::vector<Six<T>>> exerted(n);
+    std::vector<exact::Vector<T>> p(n);
+    std::vector<std::vector<exact::Vector<T>>> P(n, std::vector<exact::Vector<T>>(n));
+    for (size_t e = 0; e < n; ++e) p[e] = AcrossAxis(loaded_[e].joint, carried_, force_);
+    for (size_t d = 0; d < n; ++d) {
+      std::vector<T> work;
+      for (const Virtual& motion : motions) {
+        work.push_back(-model_.Along(motion, loaded_[d].wrenches));
+      }
+      response[d] = system.Solve(work);
+      exerted[d].resize(carried_.size());
+      Exert(T(1), loaded_[d].wrenches, &exerted[d]);
+      for (size_t e = 0; e < n; ++e) {
+        P[e][d] = AcrossAxis(loaded_[e].joint, exerted[d], response[d]);
+      }
+    }
+    double contraction = 0.0;
+    for (size_t e = 0; e < n; ++e) {
+      T sum(0);
+      for (size_t d = 0; d < n; ++d) sum += Norm(P[e][d]) * abs(loaded_[d].slope);
+      contraction = std::max(contraction, Size(sum));
+    }
+    if (!(contraction < 1.0)) return "not provable: friction and loads raise each other";
+    const auto loads = [&](const std::vector<T>& of) {
+      std::vector<T> next(n);
+      for (size_t e = 0; e < n; ++e) {
+        exact::Vector<T> sum = p[e];
+        for (size_t d = 0; d < n; ++d)
+          sum = sum + exact::Times(T(loaded_[d].slope * of[d]), P[e][d]);
+        next[e] = Norm(sum);
+      }
+      return next;
+    };
+    std::vector<T> load(n, T(0)), next;
+    double step = kInfinity;
+    for (int k = 0; k < 1000; ++k) {
+      next = loads(load);
+      double now = 0.0;
+      for (size_t e = 0; e < n; ++e) now = std::max(now, Size(T(next[e] - load[e])));
+      if (!(now < step)) break;
+      step = now;
+      for (size_t e = 0; e < n; ++e) load[e] = Middle(next[e]);
+    }
+    next = loads(load);
+    step = 0.0;
+    for (size_t e = 0; e < n; ++e) step = std::max(step, Size(T(next[e] - load[e])));
+    for (size_t d = 0; d < n; ++d) {
+      const T force = loaded_[d].slope * Around(load[d], step / (1.0 - contraction) * Slack(4));
+      for (size_t k = 0; k < force_.size(); ++k) force_[k] += force * response[d][k];
+      Exert(force, loaded_[d].wrenches);
+    }
+    return "";
+  }
+  static T Norm(const exact::Vector<T>& v) { return sqrt(T(Dot(v, v))); }
+  // Of the force that a joint bears, in its frame, where bodies have to be carried so and the
+  // chosen forces are these.
+  [[nodiscard]] exact::Vector<T> AcrossAxis(size_t j, const std::vector<Six<T>>& carried,
+                                            const std::vector<T>& forces) const {
+    std::vector<T> all(forces_.size(), T(0));
+    for (size_t k = 0; k < columns_.size(); ++k) all[columns_[k]] = forces[k];
+    const Joint& joint = mechanism().joints[j];
+    const std::array<T, 6> bears = model_.InJoint(joint, ReactionsOf(carried, all)[j], bodies_);
+    const exact::Vector<T> f{{bears[0], bears[1], bears[2]}};
+    const exact::Vector<T> axis = exact::Unit(exact::Lifted<T>(joint.axis));
+    return f - exact::Times(T(Dot(axis, f)), axis);
+  }
+
+  // More drives than are needed: of all forces x that A x = b allows, those of drives and
+  // prescribed joints of least norm, moments divided by the characteristic length. With multipliers
+  // μ,
   //   A x = b,  W x − Aᵀ μ = 0,  W: 1 (1/L² of moments) of what counts, 0 of what does not
   void Share(Rows* A, std::vector<T>* work, std::vector<double>* row_scale,
              std::vector<double>* column_scale) const {
@@ -677,17 +761,21 @@ class Prover {
   }
 
   void Exert(const T& force, const std::vector<Wrench<T>>& wrenches) {
+    Exert(force, wrenches, &carried_);
+  }
+  static void Exert(const T& force, const std::vector<Wrench<T>>& wrenches,
+                    std::vector<Six<T>>* carried) {
     for (const Wrench<T>& wrench : wrenches) {
       const Six<T> part = Times(force, wrench.on_child);
-      Six<T>&child = carried_[static_cast<size_t>(wrench.child)],
-      &parent = carried_[static_cast<size_t>(wrench.parent)];
+      Six<T>&child = (*carried)[static_cast<size_t>(wrench.child)],
+      &parent = (*carried)[static_cast<size_t>(wrench.parent)];
       child = child - part;
       parent = parent + part;
     }
   }
 
-  // An expression is a function of doubles: what it gives at the doubles nearest to its inputs counts
-  // as exact.
+  // An expression is a function of doubles: what it gives at the doubles nearest to its inputs
+  // counts as exact.
   [[nodiscard]] double Followed(const StateFunction& function, const Start& start) const {
     std::vector<double> inputs;
     for (const StateFunction::Input& input : function.inputs) {
@@ -697,7 +785,8 @@ class Prover {
       const bool driven = drive || input.coordinate.kind == Coordinate::Kind::kPrescribed;
       const size_t turn = mechanism().elements.size() + (drive ? i : drives + i);
       const double near = driven && turn < start.turns.size() ? start.turns[turn] : input.near;
-      const Series<T> x = model_.ValueAt(model_.CoordinateEquation(input.coordinate, near), motions_);
+      const Series<T> x =
+          model_.ValueAt(model_.CoordinateEquation(input.coordinate, near), motions_);
       inputs.push_back(Nearest(input.rate ? x.r : x.v));
     }
     return function.value(start.time_s, inputs);
@@ -782,6 +871,10 @@ class Prover {
           size += (T(friction->breakaway) - T(friction->coulomb)) * exp(T(-slowness * slowness));
         }
         force = T(-sign) * size;
+        if (friction->coefficient > 0.0) {
+          const T slope = T(friction->coefficient) * T(friction->radius);
+          loaded_.push_back({static_cast<size_t>(element.joint), T(-sign) * slope, wrenches});
+        }
       }
     }
     Exert(force, wrenches);
@@ -816,19 +909,19 @@ class Prover {
     if (reactions_unique_) ReportReactions(all, proof);
   }
 
-  void ReportReactions(const std::vector<T>& all, SampleProof* proof) {
-    // What is left for the tree's joints.
-    for (size_t k = 0; k < forces_.size(); ++k) Exert(all[k], forces_[k].wrenches);
+  // On children, of all joints: what cut ones transmit, and what is left for the tree's.
+  [[nodiscard]] std::vector<Six<T>> ReactionsOf(std::vector<Six<T>> carried,
+                                                const std::vector<T>& all) const {
+    for (size_t k = 0; k < forces_.size(); ++k) Exert(all[k], forces_[k].wrenches, &carried);
     std::vector<Six<T>> on_child(mechanism().joints.size());
     for (size_t t = 0; t < mechanism().tree_joints.size(); ++t) {
       const int outboard = model_.OutboardOf(t);
-      const Six<T> sum = model_.SumBeyond(outboard, carried_);
+      const Six<T> sum = model_.SumBeyond(outboard, carried);
       on_child[static_cast<size_t>(mechanism().tree_joints[t])] =
           mechanism().tree_reversed[t] ? Six<T>() - sum : sum;
     }
-    size_t at = 0;
+    size_t at = 0, equation = 0;
     const std::vector<bool> transmitting = model_.Transmitting();
-    size_t equation = 0;
     for (size_t j = 0; j < mechanism().joints.size(); ++j) {
       if (!mechanism().joints[j].closure) continue;
       const auto locks = static_cast<size_t>(6 - DofsOf(mechanism().joints[j].kind));
@@ -838,6 +931,11 @@ class Prover {
         ++at;
       }
     }
+    return on_child;
+  }
+
+  void ReportReactions(const std::vector<T>& all, SampleProof* proof) const {
+    const std::vector<Six<T>> on_child = ReactionsOf(carried_, all);
     for (size_t j = 0; j < mechanism().joints.size(); ++j) {
       const Joint& joint = mechanism().joints[j];
       const std::array<T, 6> parts = model_.InJoint(joint, on_child[j], bodies_);
@@ -864,18 +962,13 @@ class Prover {
   typename Model<T>::Motions motions_;
   std::vector<Six<T>> carried_;  ///< required less applied, per body
   std::vector<Force> forces_;
+  std::vector<Loaded> loaded_;  ///< friction by load, of what slides
   std::vector<T> force_;
 };
 
 // Why a mechanism in motion is not served.
-std::string WhyNotServed(const Mechanism& mechanism, const Motion& motion) {
+std::string WhyNotServed(const Motion& motion) {
   if (motion.free()) return "a free motion: forces are given, and motions are integrated";
-  for (const ForceElement& element : mechanism.elements) {
-    const auto* friction = std::get_if<FrictionLaw>(&element.law);
-    if (friction != nullptr && friction->coefficient > 0.0) {
-      return Described(mechanism, element) + " depends on the joint's load";
-    }
-  }
   return "";
 }
 
@@ -1073,7 +1166,7 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
                     const std::vector<CertifiedTrace>& traces, const CertifyOptions& options) {
   const Clock::time_point begun = Clock::now();
   Certificate certificate;
-  certificate.why_not = WhyNotServed(mechanism, motion);
+  certificate.why_not = WhyNotServed(motion);
   if (!certificate.why_not.empty()) return certificate;
   const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
   const std::set<size_t> chosen =
@@ -1140,7 +1233,8 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
   for (const Load& load : motion.loads) {
     if (load.following.empty()) continue;
     certificate.left_out.push_back(fmt::format(
-        "load '{}' is an expression: its own rounding, in doubles, is not in the bounds", load.name));
+        "load '{}' is an expression: its own rounding, in doubles, is not in the bounds",
+        load.name));
   }
   certificate.left_out.emplace_back(
       "which of several assembly modes is meant: the one of the reference's pose is proved");
