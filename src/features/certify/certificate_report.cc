@@ -171,13 +171,14 @@ void AddCertificate(const Prepared& prepared, const CertifyOptions& options, Rep
   const Certificate certificate =
       Certify(prepared.mechanisms.reference, prepared.scenario.motion, traces, options);
   Comparison& comparison = report->comparison;
+  comparison.reason += "; " + certificate.Sentence();
   if (const WitnessProof* wrong = certificate.FirstWrong(); wrong != nullptr) {
     std::string& text = comparison.attribution.text;
     text = wrong->Sentence() + (text.empty() ? "" : "; " + text);
     comparison.attribution.odd_one_out = wrong->witness;
     if (comparison.verdict == Verdict::kAgree) {
       comparison.verdict = Verdict::kDisagree;
-      comparison.reason = wrong->Sentence();
+      comparison.reason = wrong->Sentence() + "; " + certificate.Sentence();
     }
   }
   report->parts.push_back({"certificate", SectionOf(certificate), Dump(JsonOf(certificate))});

@@ -359,7 +359,8 @@ TEST(Certify, LeavesAgreementsAndShowsDigits) {
       RunScenario(SourcePath("/scenarios/spr_tripod/default_inverse.yaml"), options);
   EXPECT_EQ(outcome.exit_code, 0);
   ASSERT_TRUE(outcome.report.has_value());
-  EXPECT_THAT(ToTable(*outcome.report, {}), HasSubstr("rive forces proved to 1"));
+  EXPECT_THAT(ToTable(*outcome.report, {}), HasSubstr("Drive forces proved to 1"));
+  EXPECT_THAT(outcome.report->comparison.reason, HasSubstr("; drive forces proved to 1"));
   EXPECT_THAT(ToJson(*outcome.report), HasSubstr("\"certificate\""));
 }
 
