@@ -442,12 +442,22 @@ std::vector<Wrench<T>> Model<T>::WrenchesAt(const Equation<T>& equation, const P
   for (const auto& term : equation.terms) {
     const size_t pair = term.scalar.frames;
     if (seeds->pair != pair) Seed(pair, bodies, seeds);
-    const Tangent<T> x = term.scalar.Of(seeds->d, seeds->R, term.near);
-    const Tangent<T> y = Polynomial(term.polynomial, x);
     Wrench<T> wrench{pairs_[pair].parent, pairs_[pair].child, {}};
-    wrench.on_child.f = seeds->F.R * Vector<T>{{y.g[3], y.g[4], y.g[5]}};
-    wrench.on_child.m =
-        seeds->F.R * Vector<T>{{y.g[0], y.g[1], y.g[2]}} + Cross(seeds->M.p, wrench.on_child.f);
+    const Scalar<T>& scalar = term.scalar;
+    // Those of most locks are simple: f·d has the slope f, and f·R m, by a turn ω, ω·(R m × f).
+    if (scalar.kind == Scalar<T>::Kind::kSlide && term.polynomial.size() == 1) {
+      wrench.on_child.f = seeds->F.R * Times(term.polynomial[0], scalar.f);
+      wrench.on_child.m = Cross(seeds->M.p, wrench.on_child.f);
+    } else if (scalar.kind == Scalar<T>::Kind::kCosine && term.polynomial.size() == 1) {
+      wrench.on_child.m =
+          Times(term.polynomial[0], Cross(seeds->M.R * scalar.m, seeds->F.R * scalar.f));
+    } else {
+      const Tangent<T> x = scalar.Of(seeds->d, seeds->R, term.near);
+      const Tangent<T> y = Polynomial(term.polynomial, x);
+      wrench.on_child.f = seeds->F.R * Vector<T>{{y.g[3], y.g[4], y.g[5]}};
+      wrench.on_child.m =
+          seeds->F.R * Vector<T>{{y.g[0], y.g[1], y.g[2]}} + Cross(seeds->M.p, wrench.on_child.f);
+    }
     wrenches.push_back(std::move(wrench));
   }
   return wrenches;
