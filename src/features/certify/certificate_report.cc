@@ -151,25 +151,38 @@ nlohmann::ordered_json JsonOf(const Certificate& certificate) {
 }  // namespace
 
 void AddCertificate(const Prepared& prepared, const CertifyOptions& options, Report* report) {
+  // A closed form and the reference compute the commanded motion to the last digits; the limit of
+  // the scenario counts where it is larger. Whoever else is there has its own limits.
+  const auto limit = [&](const std::string& measured, const std::string& truth) {
+    for (const CheckResult& check : report->comparison.checks) {
+      const bool pair = check.measured == measured && (truth.empty() || check.truth == truth);
+      if (pair && check.of_pair() && check.metric == Metric::kForceMax && check.limit) {
+        return *check.limit;
+      }
+    }
+    return kNan;
+  };
+  CertifyOptions with = options;
+  if (const double own = limit(role::kReference.name, role::kAnalytic.name); own > with.limit) {
+    with.limit = own;
+  }
   std::vector<CertifiedTrace> traces;
   for (const WitnessRecord& record : report->witnesses) {
     if (!record.summary.ok() || record.trace.time_s.empty()) continue;
     const Role* role = FindRole(record.name);
-    CertifiedTrace trace{record.name, &record.trace, role != nullptr && role->is_engine()};
+    const bool table = record.name == role::kReference && prepared.has_table();
+    const bool computed = role != nullptr && !role->is_engine() && !table;
     // Reached and perturbed runs have another motion than the commanded one.
     if (role != nullptr && role->kind == RoleKind::kAfterwards) continue;
-    if (trace.engine && !PrescribesMotion(prepared.scenario.simulation.mode)) continue;
-    if (trace.engine) {
-      for (const CheckResult& check : report->comparison.checks) {
-        if (check.measured == record.name && check.metric == Metric::kForceMax && check.limit) {
-          trace.limit = *check.limit;
-        }
-      }
+    if (role != nullptr && role->is_engine() &&
+        !PrescribesMotion(prepared.scenario.simulation.mode)) {
+      continue;
     }
-    traces.push_back(trace);
+    traces.push_back({record.name, &record.trace, !computed,
+                      computed ? kNan : limit(record.name, std::string())});
   }
   const Certificate certificate =
-      Certify(prepared.mechanisms.reference, prepared.scenario.motion, traces, options);
+      Certify(prepared.mechanisms.reference, prepared.scenario.motion, traces, with);
   Comparison& comparison = report->comparison;
   comparison.reason += "; " + certificate.Sentence();
   if (const WitnessProof* wrong = certificate.FirstWrong(); wrong != nullptr) {

@@ -623,6 +623,7 @@ class Prover {
     for (size_t e = 0; e < n; ++e) p[e] = AcrossAxis(loaded_[e].joint, carried_, force_);
     for (size_t d = 0; d < n; ++d) {
       std::vector<T> work;
+      work.reserve(motions.size());
       for (const Virtual& motion : motions) {
         work.push_back(-model_.Along(motion, loaded_[d].wrenches));
       }
@@ -984,6 +985,7 @@ size_t WorstSample(const Mechanism& mechanism, const std::vector<CertifiedTrace>
   for (size_t a = 0; a < traces.size(); ++a) {
     for (size_t b = a + 1; b < traces.size(); ++b) {
       const Trace &x = *traces[a].trace, &y = *traces[b].trace;
+      if (x.time_s != y.time_s) continue;
       for (const Drive& drive : mechanism.drives) {
         const int i = x.Find(Quantity::kForce, drive.name),
                   j = y.Find(Quantity::kForce, drive.name);
@@ -1074,6 +1076,13 @@ class Scales {
   std::map<std::pair<int, std::string>, double> largest_;
 };
 
+// The row of a sample time; -1: the trace (a table's) has none there.
+Eigen::Index RowAt(const Trace& trace, double time_s) {
+  const auto at = std::lower_bound(trace.time_s.begin(), trace.time_s.end(), time_s - 1e-9);
+  if (at == trace.time_s.end() || std::abs(*at - time_s) > 1e-9) return -1;
+  return at - trace.time_s.begin();
+}
+
 void Compare(const CertifiedTrace& of, const Mechanism& mechanism, double duration_s,
              const std::vector<SampleProof>& samples, double computed_limit,
              std::vector<WitnessProof>* proofs) {
@@ -1083,12 +1092,12 @@ void Compare(const CertifiedTrace& of, const Mechanism& mechanism, double durati
   proof.limit = of.engine ? of.limit : computed_limit;
   const Scales scales(*of.trace, mechanism, duration_s);
   for (const SampleProof& sample : samples) {
+    const Eigen::Index row = RowAt(*of.trace, sample.time_s);
+    if (row < 0) continue;
     for (const ProvedValue& value : sample.values) {
       const int column = of.trace->Find(value.channel);
-      if (column < 0 || static_cast<Eigen::Index>(sample.index) >= of.trace->values.rows()) {
-        continue;
-      }
-      const double stated = of.trace->values(static_cast<Eigen::Index>(sample.index), column);
+      if (column < 0) continue;
+      const double stated = of.trace->values(row, column);
       if (!std::isfinite(stated)) continue;
       const double largest = scales.Of(static_cast<size_t>(column));
       const double off =

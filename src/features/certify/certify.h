@@ -97,12 +97,12 @@ struct CertifyOptions {
   std::function<void(double)> progress = {};
 };
 
-/// Witnesses' traces on the motion's sample grid.
+/// What a witness recorded.
 struct CertifiedTrace {
   std::string witness;
   const Trace* trace = nullptr;
-  bool engine = false;
-  double limit = kNan;  ///< of an engine; NaN: none
+  bool engine = false;  ///< a simulation, a table, a program: its own limits judge it
+  double limit = kNan;  ///< of these; NaN: none
 };
 
 /// In addition to the spread samples, that is proved where the witnesses' forces differ most.

@@ -350,6 +350,32 @@ TEST(Certify, TakesAnAgreementAway) {
   EXPECT_EQ(outcome.report->comparison.attribution.odd_one_out, "analytic");
 }
 
+Comparison Certified(const std::string& scenario) {
+  RunOptions options;
+  options.after_judgement = [](const Prepared& prepared, Report* report) {
+    AddCertificate(prepared, {}, report);
+  };
+  const RunOutcome outcome = RunScenario(SourcePath("/scenarios/") + scenario + ".yaml", options);
+  EXPECT_TRUE(outcome.report.has_value()) << scenario;
+  return outcome.report ? outcome.report->comparison : Comparison();
+}
+
+TEST(Certify, NamesTheCulpritAlsoOfTwo) {
+  const Comparison three = Certified("stabilizing_platform/must_fail/analytic_mass");
+  EXPECT_EQ(three.verdict, Verdict::kDisagree);
+  EXPECT_THAT(three.attribution.text, HasSubstr("proved: analytic is off by"));
+  const Comparison two = Certified("four_bar/must_fail/wrong_mass");
+  EXPECT_EQ(two.verdict, Verdict::kDisagree);
+  EXPECT_THAT(two.attribution.text, HasSubstr("proved: simulation is off by"));
+}
+
+// An exported table has the digits that were printed, and the limits that follow from them.
+TEST(Certify, LeavesTablesTheirOwnLimits) {
+  const Comparison table = Certified("four_bar/table_adams");
+  EXPECT_EQ(table.verdict, Verdict::kAgree);
+  EXPECT_THAT(table.reason, HasSubstr("; reference is right to"));
+}
+
 TEST(Certify, LeavesAgreementsAndShowsDigits) {
   RunOptions options;
   options.after_judgement = [](const Prepared& prepared, Report* report) {
