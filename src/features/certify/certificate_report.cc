@@ -181,8 +181,7 @@ void AddCertificate(const Prepared& prepared, const CertifyOptions& options, Rep
     traces.push_back({record.name, &record.trace, !computed,
                       computed ? kNan : limit(record.name, std::string())});
   }
-  const Certificate certificate =
-      Certify(prepared.mechanisms.reference, prepared.scenario.motion, traces, with);
+  const Certificate certificate = Certify(prepared.base, prepared.scenario.motion, traces, with);
   Comparison& comparison = report->comparison;
   comparison.reason += "; " + certificate.Sentence();
   if (const WitnessProof* wrong = certificate.FirstWrong(); wrong != nullptr) {

@@ -7,8 +7,9 @@
 
 namespace mbv {
 
-/// Certifies a judged run: adds `certificate` to its parts. A computed witness that is wrong by
-/// proof takes an agreement away, and names the culprit of a disagreement.
+/// Certifies a judged run, of the mechanism with the scenario's common parameters: adds
+/// `certificate` to its parts. A computed witness that is wrong by proof takes an agreement away,
+/// and names the culprit of a disagreement.
 void AddCertificate(const Prepared& prepared, const CertifyOptions& options, Report* report);
 
 }  // namespace mbv

@@ -366,7 +366,7 @@ TEST(Certify, NamesTheCulpritAlsoOfTwo) {
   EXPECT_THAT(three.attribution.text, HasSubstr("proved: analytic is off by"));
   const Comparison two = Certified("four_bar/must_fail/wrong_mass");
   EXPECT_EQ(two.verdict, Verdict::kDisagree);
-  EXPECT_THAT(two.attribution.text, HasSubstr("proved: simulation is off by"));
+  EXPECT_THAT(two.attribution.text, HasSubstr("proved: reference is off by"));
 }
 
 // An exported table has the digits that were printed, and the limits that follow from them.
