@@ -16,6 +16,7 @@
 #include "report/plot_points.h"
 #include "report/reference_table.h"
 #include "report/result.h"
+#include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"
 
@@ -275,6 +276,7 @@ class PageWriter {
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     page_.Add("Motors", "Motors", SizingHtml(report_));
     page_.Add(ContactSection(report_));
+    page_.Add(SingularitySection(report_, false));
     page_.Add(EngineSection(report_));
     if (report_.source_model != nullptr) {
       page_.Add(SourceModelSection(*report_.source_model, false));

@@ -6,6 +6,7 @@
 #include "report/motion_tables.h"
 #include "report/report.h"
 #include "report/result.h"
+#include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"
 
@@ -260,6 +261,7 @@ std::string ToJson(const Report& report) {
   json["loads"] = LoadsJson(report);
   if (!report.motors.empty()) json["motors"] = SizingJson(report);
   if (!report.contact_loads.empty()) json["contacts"] = ContactsJson(report);
+  if (!report.singular.of.empty()) json["singularity"] = SingularityJson(report);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);
   json["pictures"] = report.pictures;

@@ -11,6 +11,7 @@
 #include "report/plot_points.h"
 #include "report/reference_table.h"
 #include "report/report.h"
+#include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"
 #include "report/terminal_text.h"
@@ -35,6 +36,7 @@ class VerdictTableWriter {
     out_.Add(MotionTableSection(report, out_.verbose()));
     AddLines(SizingLines(report, out_.sizing() || out_.verbose()));
     out_.Add(ContactSection(report));
+    out_.Add(SingularitySection(report, out_.verbose()));
     out_.Add(DriveSection(report));
     out_.Add(EngineSection(report));
     if (report.source_model != nullptr) {

@@ -13,6 +13,7 @@
 #include "comparison/comparison.h"
 #include "comparison/contact_load.h"
 #include "comparison/motor_load.h"
+#include "kinematics/singularity.h"
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -106,6 +107,7 @@ struct Report : ResultFrame {
   std::shared_ptr<const SourceModelAudit> source_model;  ///< of a robot's MJCF; null without one
   std::vector<ReportPart> parts = {};
   std::vector<std::string> pictures;       ///< file names below snapshots/
+  SingularApproaches singular;             ///< of the motion
   std::vector<ContactLoad> contact_loads;  ///< by witness that ran, then by contact, then all
 };
 

@@ -23,6 +23,7 @@
 #include "features/run/engine_errors.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility.h"
+#include "kinematics/singularity.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "mechanism/reach.h"
@@ -33,6 +34,7 @@
 #include "report/html_report.h"
 #include "report/json.h"
 #include "report/report.h"
+#include "report/singular_poses.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
 #include "scenario/tables/table.h"
@@ -246,6 +248,20 @@ double LoadInertia(const Mechanism& mechanism, int drive) {
   return ForceAtStart(mechanism, drive, drive) - ForceAtStart(mechanism, drive, -1);
 }
 
+// Of all bodies per sample, as far as the reference gets.
+std::vector<std::vector<Pose>> ReferencePoses(const Mechanism& mechanism, const Motion& motion) {
+  std::vector<std::vector<Pose>> X_WB;
+  ReferenceSolver solver(mechanism, motion, {.explain_unreached = false});
+  CommandSample command;
+  ReferenceSample sample;
+  for (const double t_s : SampleTimes(motion.duration_s, motion.sample_s)) {
+    EvaluateMotion(motion, t_s, &command);
+    if (!solver.Kinematics(command, &sample).ok()) break;
+    X_WB.push_back(sample.states.X_WB);
+  }
+  return X_WB;
+}
+
 }  // namespace
 namespace {
 
@@ -411,6 +427,25 @@ class ScenarioRun {
     report_.witnesses = std::move(runs_.records);
     SizeMotors();
     LoadContacts();
+    MeasureSingularity();
+  }
+
+  // Along the simulated motion, or, where nothing was simulated, along that of the reference.
+  void MeasureSingularity() {
+    const Motion& motion = scenario().motion;
+    const bool simulated = runs_.simulation && !runs_.simulation->X_WB.empty();
+    std::vector<std::vector<Pose>> X_WB;
+    if (!simulated && !motion.free())
+      X_WB = ReferencePoses(prepared_->mechanisms.reference, motion);
+    const Trace* forces = nullptr;
+    for (const WitnessRecord& record : report_.witnesses) {
+      if (!record.summary.ok() || record.trace.time_s.empty() || base().drives.empty()) continue;
+      if (record.trace.Find(Quantity::kForce, base().drives.front().name) < 0) continue;
+      if (forces == nullptr || record.name == prepared_->driver()) forces = &record.trace;
+    }
+    report_.singular = ApproachesOf(base(), motion, SampleTimes(motion.duration_s, motion.sample_s),
+                                    simulated ? runs_.simulation->X_WB : X_WB, forces);
+    for (const std::string& text : SingularityWarnings(report_.singular)) AddWarning(text);
   }
 
   // Where an integrated simulation alone disagrees: is it the mechanism or the step? The same run

@@ -29,7 +29,11 @@ struct SetArguments {
 
   [[nodiscard]] bool any() const {
     return !output.empty() || !over.empty() || !at.empty() || !from.empty() || !ranges.empty() ||
-           !cones.empty() || cross_singularities || flood.resolution > 0;
+           !cones.empty() || any_of_set();
+  }
+  /// What one pose has no use for.
+  [[nodiscard]] bool any_of_set() const {
+    return !cones.empty() || cross_singularities || flood.resolution > 0;
   }
 };
 

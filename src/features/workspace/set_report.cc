@@ -175,6 +175,9 @@ LinePlot BoundaryPlot(const SetReport& report) {
   PlotLine singular{.label = "type-2 singularity inside", .points = {}, .dashed = true};
   for (const TracedArc& arc : report.quality.singular) Append(set, arc, &singular);
   if (!singular.points.empty()) plot.lines.push_back(std::move(singular));
+  PlotLine lost{.label = "constraint singularity inside", .points = {}, .dashed = true};
+  for (const TracedArc& arc : report.constraint) Append(set, arc, &lost);
+  if (!lost.points.empty()) plot.lines.push_back(std::move(lost));
   return plot;
 }
 
@@ -331,6 +334,13 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
                             report.quality.singular.size()),
                 On::kAll);
   }
+  if (!report.constraint.empty()) {
+    bounds.Note(
+        fmt::format("constraint singularities inside the set, in {} cells of the lattice: the "
+                    "joints alone lose rank on these curves, and the set goes on beyond",
+                    report.constraint.size()),
+        On::kAll);
+  }
   sections.push_back(std::move(bounds));
 
   ReportSection quality{.title = "Quality", .link = "Quality"};
@@ -394,6 +404,10 @@ std::string BoundaryCsv(const SetReport& report) {
   for (size_t a = 0; a < report.quality.singular.size(); ++a) {
     rows(0, set.traced.sections[0].loops.size(), a, report.quality.singular[a], kNan, "inside",
          WordOf(SetBound::Kind::kType2));
+  }
+  for (size_t a = 0; a < report.constraint.size(); ++a) {
+    rows(0, set.traced.sections[0].loops.size() + 1, a, report.constraint[a], kNan, "inside",
+         WordOf(SetBound::Kind::kConstraint));
   }
   return csv;
 }
@@ -534,6 +548,7 @@ Json ToJson(const SetReport& report) {
           {"checked_poses", set.checked},
           {"checked_difference", Number(set.checked_off)},
           {"characteristic_length_m", Number(set.length)},
+          {"constraint_cells", report.constraint.size()},
           {"quality", std::move(indices)}};
 }
 

@@ -22,6 +22,7 @@ struct SetReport {
   std::string mechanism;
   ReachableSet set;
   QualityMap quality;
+  std::vector<TracedArc> constraint;  ///< constraint singularities inside (constraint_curves.h)
   std::vector<KnownMeasure> known;
 
   /// Of both ways and of all that is known otherwise.

@@ -11,6 +11,9 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
+#include "features/workspace/constraint_curves.h"
+#include "features/workspace/joint_space.h"
+#include "features/workspace/modes.h"
 #include "features/workspace/set_report.h"
 #include "features/workspace/workspace.h"
 #include "model_file/load_model.h"
@@ -22,8 +25,9 @@ namespace {
 
 struct WorkspaceArguments {
   std::string model, out = "out";
+  std::string modes;  // "drives", "output", "all"; "": a set
   std::vector<std::string> set;
-  bool no_pictures = false;
+  bool no_pictures = false, joint_space = false;
   int jobs = 1;
   SetArguments set_of_poses;
   RobotArguments options;
@@ -118,6 +122,7 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   }
   report.quality = MapQuality(*question, report.set, question->output, arguments.jobs,
                               StageOf(progress, "qualities"));
+  report.constraint = ConstraintCurves(*question, report.set);
   line->Clear();
   WorkspaceOutcome form;
   if (FindWorkspaceForm(mechanism.name) != nullptr) {
@@ -139,6 +144,53 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   return WriteResults(arguments, mechanism.name, files, report.agree(), json, inputs);
 }
 
+// Of one pose: in how many ways its drives, or its coordinates, can be had; and type-2 curves over
+// two drives.
+int WaysToClose(const WorkspaceArguments& arguments, const Mechanism& mechanism,
+                const ProgressFunction& progress, ProgressLine* line,
+                const std::vector<InputFile>& inputs) {
+  Diagnostics diagnostics;
+  const auto question = ReadQuestion(mechanism, arguments.set_of_poses, &diagnostics);
+  if (arguments.set_of_poses.any_of_set() || (arguments.joint_space && !arguments.modes.empty())) {
+    diagnostics.AddError(arguments.joint_space ? "--joint-space" : "--modes",
+                         "it asks for another thing than a set of poses",
+                         "leave out --resolution, --cone, --cross-singularities and the other one "
+                         "of --modes and --joint-space");
+  }
+  nlohmann::ordered_json json = OutcomeJson(mechanism.name, true, {});
+  Files files;
+  std::string text;
+  std::FILE* to = arguments.json.text();
+  const TextStyle style = {.color = WantsColor(to), .columns = TerminalColumns(to)};
+  RunSummary summary = RunSummary::Done();
+  if (!diagnostics.has_errors() && arguments.joint_space) {
+    const JointSpaceCurves curves =
+        JointSpaceOf(*question, arguments.jobs, StageOf(progress, "type-2 curves"), &diagnostics);
+    summary = curves.summary;
+    if (!diagnostics.has_errors()) {
+      text = ToText(mechanism, curves, style);
+      json["joint_space"] = ToJson(mechanism, curves);
+      files = JointSpaceFiles(mechanism, curves);
+    }
+  } else if (!diagnostics.has_errors()) {
+    const ModesOfPose modes =
+        FindModesOfPose(*question, arguments.modes != "output", arguments.modes != "drives",
+                        arguments.jobs, progress, &diagnostics);
+    text = ToText(mechanism, modes, style);
+    json["modes"] = ToJson(mechanism, modes);
+    files = ModeFiles(mechanism, modes);
+  }
+  line->Clear();
+  SayText(stderr, diagnostics.Text());
+  if (diagnostics.has_errors()) return 2;
+  SayText(to, text);
+  if (!summary.ok()) {
+    Say(stderr, "error: {}\n", summary.message);
+    return 3;
+  }
+  return WriteResults(arguments, mechanism.name, files, true, json, inputs);
+}
+
 int Workspace(const WorkspaceArguments& arguments) {
   const InputWatch inputs;
   std::optional<LoadResult> loaded =
@@ -150,6 +202,9 @@ int Workspace(const WorkspaceArguments& arguments) {
   ProgressFunction progress;
   if (line.active()) {
     progress = [&](const std::string& what, double fraction) { line.Show(what, fraction); };
+  }
+  if (!arguments.modes.empty() || arguments.joint_space) {
+    return WaysToClose(arguments, mechanism, progress, &line, inputs.files());
   }
   if (arguments.set_of_poses.any() || FindWorkspaceForm(mechanism.name) == nullptr) {
     return SetOfPoses(arguments, mechanism, progress, &line, inputs.files());
@@ -195,6 +250,14 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
        "JOINT_deg=ANGLE: the joint's axis z (or JOINT.x_deg, JOINT.y_deg) stays within it");
   workspace->add_flag("--cross-singularities", asked.cross_singularities,
                       "poses where the drives lose their hold (type 2) end nothing");
+  workspace
+      ->add_option("--modes", arguments->modes,
+                   "instead of a set: in how many ways the pose's drives can be had (drives: "
+                   "assembly modes), or its coordinates (output: working modes), or both (all)")
+      ->check(CLI::IsMember({"drives", "output", "all"}));
+  workspace->add_flag("--joint-space", arguments->joint_space,
+                      "instead of a set: type-2 curves over the two drives of --over, the others "
+                      "held, with their cusps");
   workspace
       ->add_option("--resolution", asked.flood.resolution,
                    "finest cells across the set; otherwise 400, 240 or 64 by its dimension")

@@ -54,12 +54,36 @@ TEST_F(WorkspaceCommand, ClosedFormsStandBesideAndASurfaceIsWritten) {
   EXPECT_GT(ReadAll(folder / "reachable.stl").size(), 84u + 50u * 100u);
 }
 
+TEST_F(WorkspaceCommand, WaysToCloseAndTypeTwoCurvesAreListed) {
+  const ProgramResult ways = Call("rubbing_five_bar --modes all --at x=0.1 --json -");
+  ASSERT_EQ(ways.exit_code, 0) << ways.err;
+  const auto modes = nlohmann::json::parse(ways.out)["modes"];
+  EXPECT_EQ(modes[0]["count"], 2);  // the tool above and below its forearms' feet
+  EXPECT_EQ(modes[1]["count"], 4);  // two elbows of two limbs
+  EXPECT_THAT(ways.err, HasSubstr("2 ways to close"));
+  const std::filesystem::path folder = mbverify.folder() / "out/rubbing_five_bar/workspace";
+  EXPECT_THAT(ReadAll(folder / "modes.csv"), HasSubstr("drives,2,1,"));
+  EXPECT_THAT(ReadAll(folder / "modes.html"), HasSubstr("Ways to close"));
+  const ProgramResult curves = Call("rubbing_five_bar --joint-space --over motor1,motor2 --json -");
+  ASSERT_EQ(curves.exit_code, 0) << curves.err;
+  // Forearms in one line: two limbs cannot meet in three ways. Where the elbows meet, the equal
+  // forearms turn about them while the motors rest.
+  const auto json = nlohmann::json::parse(curves.out)["joint_space"];
+  EXPECT_FALSE(json["curves"].empty());
+  EXPECT_TRUE(json["cusps"].empty());
+  EXPECT_THAT(curves.err, HasSubstr("self-motion"));
+  EXPECT_THAT(ReadAll(folder / "joint_space.csv"), HasSubstr("curve,motor1_rad,motor2_rad"));
+}
+
 TEST_F(WorkspaceCommand, BadInputIsRefusedWithExitCode2) {
   for (const auto& [arguments, message] : std::vector<std::pair<std::string, std::string>>{
            {"four_bar --over x,qq", "there is no coordinate 'qq'"},
            {"four_bar --over x --at y=0", "'coupler.y' is no coordinate of its own at home"},
            {"floating_loop", "has no end"},
            {"rubbing_five_bar --resolution 90000", "takes about"},
+           {"rubbing_five_bar --joint-space --over x,y", "two drives are needed"},
+           {"stewart --modes drives --resolution 40", "another thing than a set"},
+           {"spring_cart --modes drives", "1 drives do not determine 2 degrees of freedom"},
            {"four_bar --base crank", "robot"}}) {
     const ProgramResult result = Call(arguments);
     EXPECT_EQ(result.exit_code, 2) << arguments << result.err;

@@ -1,0 +1,100 @@
+// Constraint singularities inside a set, by closed form.
+#include "features/workspace/constraint_curves.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "model_file/load_model.h"
+#include "tests/support/source_dir.h"
+
+namespace mbv {
+namespace {
+
+// Tsai's translational robot: each leg's two universal joints hold one couple, along what is left
+// of the leg d_i = p − δ u_i when its part along the outer axis is taken away. With three legs at
+// equal azimuths their determinant is z (√3/2) (3 δ² − 3/4 (x² + y²)): it vanishes on a circle of
+// radius 2 δ, whatever z is.
+Mechanism ThreeUpu(double delta) {
+  LoadResult result = LoadModelText(
+      R"yaml(
+name: upu
+parameters:
+  R: {value: 0.3, unit: m}
+  r: {value: )yaml" +
+          std::to_string(0.3 - delta) + R"yaml(, unit: m}
+  h: {value: 0.4, unit: m}
+gravity: [0, 0, -9.81]
+bodies:
+  platform: {mass: 2, inertia: [0.02, 0.02, 0.03]}
+parts:
+  leg:
+    parameters:
+      at: {value: 0, unit: rad}
+    attach:
+      world: {U: {position: [R*cos(at), R*sin(at), 0], rotation: {axis: z, angle: at}}}
+      platform: {S: {position: [r*cos(at), r*sin(at), 0], rotation: {axis: z, angle: at}}}
+    bodies:
+      cyl: {mass: 1, com: [0, 0, 0.1], inertia: [0.01, 0.01, 0.001]}
+      rod: {mass: 1, com: [0, 0, -0.1], inertia: [0.01, 0.01, 0.001]}
+    joints:
+      U: {kind: universal, parent: world.U, child: cyl, axis: y, axis2: x, guess: ["-asin((R - r)/sqrt(h^2 + (R - r)^2))", 0]}
+      P: {kind: prismatic, parent: cyl, child: rod, axis: z, guess: "sqrt(h^2 + (R - r)^2)", range: [0.25, 0.75]}
+      V: {kind: universal, parent: rod, child: platform.S, axis: x, axis2: y, guess: [0, "asin((R - r)/sqrt(h^2 + (R - r)^2))"]}
+    drives:
+      length: {kind: joint, joint: P}
+instances:
+  leg1: {part: leg, at: 0}
+  leg2: {part: leg, at: 2*pi/3}
+  leg3: {part: leg, at: 4*pi/3}
+outputs: {platform: platform}
+)yaml",
+      "upu.yaml");
+  EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
+  return result.mechanism.value_or(Mechanism());
+}
+
+std::vector<TracedArc> CurvesOf(const Mechanism& mechanism, const std::vector<std::string>& at) {
+  SetArguments arguments;
+  arguments.over = {"x", "y"};
+  arguments.at = at;
+  arguments.flood.resolution = 48;
+  Diagnostics diagnostics;
+  const auto question = ReadQuestion(mechanism, arguments, &diagnostics);
+  EXPECT_TRUE(question.has_value()) << diagnostics.Text();
+  const ReachableSet set = ComputeReachableSet(*question, arguments);
+  EXPECT_TRUE(set.agree) << set.verdict;
+  return ConstraintCurves(*question, set);
+}
+
+TEST(ConstraintCurves, OfATranslationalRobotAreTheCircleOfItsClosedForm) {
+  for (const double delta : {0.15, 0.12}) {
+    for (const char* z : {"z=0.4", "z=0.5"}) {
+      const std::vector<TracedArc> arcs = CurvesOf(ThreeUpu(delta), {z});
+      double length = 0.0, off = 0.0, half = 0.0;
+      for (const TracedArc& arc : arcs) {
+        ASSERT_EQ(arc.points.size(), 2u);
+        length += (arc.points[1] - arc.points[0]).norm();
+        for (const Eigen::Vector2d& p : arc.points) {
+          off = std::max(off, std::abs(p.norm() - 2 * delta));
+          half = std::max(half, std::abs(p.norm() - 2 * delta * 1.0001));
+        }
+      }
+      EXPECT_LT(off, 1e-7) << delta << z;
+      EXPECT_GT(half, 1e-5);  // another circle would be noticed
+      // All around: chords are shorter than the circle.
+      const double circle = 4 * std::numbers::pi * delta;
+      EXPECT_LT(length, circle);
+      EXPECT_GT(length, 0.98 * circle);
+    }
+  }
+}
+
+TEST(ConstraintCurves, AreNoneOfRobotsThatHaveNone) {
+  LoadResult result = LoadModel(SourcePath("/models/rubbing_five_bar/model.yaml"));
+  EXPECT_TRUE(CurvesOf(*result.mechanism, {}).empty());
+}
+
+}  // namespace
+}  // namespace mbv
