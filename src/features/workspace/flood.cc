@@ -14,6 +14,7 @@
 #include <unordered_map>
 
 #include "base/worker_pool.h"
+#include "features/workspace/fibre.h"
 
 namespace mbv {
 namespace {
@@ -39,6 +40,7 @@ struct LatticeHash {
 
 struct Corner {
   bool inside = false, closes = false;
+  bool passes = false;  // the way goes on from here
   int bound = -1;
   SpacePose pose;  // where it closes
 };
@@ -68,7 +70,12 @@ class Flooder {
  public:
   Flooder(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
           const FloodPlan& plan, const std::function<void(double)>& progress)
-      : space_(space), home_(home), settings_(settings), progress_(progress), k_(space.over()) {
+      : space_(space),
+        home_(home),
+        settings_(settings),
+        progress_(progress),
+        k_(space.over()),
+        fibre_(space.settings()) {
     set_.step = plan.step;
     set_.summary = plan.summary;
   }
@@ -83,6 +90,11 @@ class Flooder {
         CutEdges(level);
         set_.levels.push_back(Measure(level, level == settings_.halvings));
       }
+    }
+    if (std::ranges::none_of(corners_, [](const auto& known) { return known.second.inside; })) {
+      set_.summary.stop = Stop::kUnreachable;
+      set_.summary.message = "none of the poses of the lattice has all of the range";
+      return std::move(set_);
     }
     const auto count = set_.levels.size();
     set_.measure = set_.levels.back();
@@ -120,8 +132,14 @@ class Flooder {
       if (!known.closes) known = std::move(corner);
       return;
     }
-    if (known.inside && corner.inside && Differ(known.pose, corner.pose)) ++set_.conflicts;
-    if (!known.inside && corner.inside) known = std::move(corner);
+    // The best of some poses depends on the way.
+    const bool unique = !fibre_.any() || space_.settings().for_all;
+    if (unique && known.inside && corner.inside && Differ(known.pose, corner.pose)) {
+      ++set_.conflicts;
+    }
+    if (!known.inside && (corner.inside || (corner.passes && !known.passes))) {
+      known = std::move(corner);
+    }
   }
   [[nodiscard]] bool Differ(const SpacePose& a, const SpacePose& b) const {
     for (size_t j = 0; j < a.X_FM.size(); ++j) {
@@ -135,15 +153,29 @@ class Flooder {
     return false;
   }
 
+  // The pose at free coordinates, with margins over the range that is asked.
+  [[nodiscard]] Fibre::Reach Close(const PoseSpace& space, const PlacedPose& from, const VecX& x,
+                                   PlacedPose* at, double* at_start) const {
+    if (fibre_.any()) return fibre_.At(space, from, x, at, at_start);
+    return space.Close(from, space.Target(x), at) ? Fibre::Reach::kWhole : Fibre::Reach::kNone;
+  }
+
   [[nodiscard]] Corner Visit(const PoseSpace& space, const PlacedPose& from,
                              const Lattice& key) const {
     Corner corner;
     PlacedPose at;
-    if (!space.Close(from, space.Target(At(key)), &at)) return corner;
+    double at_start = 0.0;
+    const Fibre::Reach reach = Close(space, from, At(key), &at, &at_start);
+    if (reach == Fibre::Reach::kNone) return corner;
     corner.closes = true;
     Eigen::Index worst = 0;
-    corner.inside = at.pose.margin.minCoeff(&worst) >= 0.0;
-    if (!corner.inside) corner.bound = static_cast<int>(worst);
+    const double least = at.pose.margin.minCoeff(&worst);
+    const bool part = reach == Fibre::Reach::kPart;
+    corner.inside = !part && least >= 0.0;
+    corner.passes = corner.inside || (space.settings().for_all && at_start >= 0.0);
+    if (!corner.inside) {
+      corner.bound = part && least >= 0.0 ? FoldBound(at.pose.margin) : static_cast<int>(worst);
+    }
     corner.pose = std::move(at.pose);
     return corner;
   }
@@ -151,8 +183,9 @@ class Flooder {
   void FloodCoarse() {
     const int spacing = SpacingAt(0);
     Corner first;
-    first.inside = first.closes = true;
+    first.inside = first.closes = first.passes = true;
     first.pose = home_.pose;
+    if (fibre_.any()) first = Visit(space_, home_, {0, 0, 0});
     corners_[{0, 0, 0}] = std::move(first);
     std::vector<Lattice> front = {{0, 0, 0}};
     while (!front.empty()) {
@@ -174,9 +207,9 @@ class Flooder {
       for (auto& list : found) {
         for (auto& [key, corner] : list) {
           const auto known = corners_.find(key);
-          const bool was_inside = known != corners_.end() && known->second.inside;
+          const bool passed = known != corners_.end() && known->second.passes;
           Take(key, std::move(corner));
-          if (!was_inside && corners_[key].inside) next.insert(key);
+          if (!passed && corners_[key].passes) next.insert(key);
         }
       }
       front.assign(next.begin(), next.end());
@@ -245,7 +278,7 @@ class Flooder {
           ForEachCorner([&](const Lattice& o) {
             const Lattice other = Sum(base, o, s);
             const auto at = corners_.find(other);
-            if (at == corners_.end() || !at->second.inside) return;
+            if (at == corners_.end() || !at->second.passes) return;
             long distance = 0;
             for (size_t c = 0; c < 3; ++c) {
               const long d = other.at(c) - key.at(c);
@@ -404,13 +437,16 @@ class Flooder {
     const VecX a = At(edge.first), b = At(edge.second);
     PlacedPose from, at;
     Cut cut;
-    if (!space.Place(corners_.find(edge.first)->second.pose, &from)) return cut;
-    double low = 0.0, high = 1.0;
-    VecX margin_low = from.pose.margin, margin_high;
+    const SpacePose& inside = corners_.find(edge.first)->second.pose;
+    if (!space.Place(inside, &from)) return cut;
+    double low = 0.0, high = 1.0, unused = 0.0;
+    VecX margin_low = inside.margin, margin_high;
     const auto close = [&](double s) {
-      return space.CloseNear(from, space.Target(a + s * (b - a)), &at);
+      const VecX x = a + s * (b - a);
+      return fibre_.any() ? fibre_.At(space, from, x, &at, &unused) == Fibre::Reach::kWhole
+                          : space.CloseNear(from, space.Target(x), &at);
     };
-    if (space.Close(from, space.Target(b), &at)) {
+    if (Close(space, from, b, &at, &unused) == Fibre::Reach::kWhole) {
       if (at.pose.margin.minCoeff() >= 0.0) {  // outside by another sheet
         cut.share = 1.0;
         return cut;
@@ -445,7 +481,7 @@ class Flooder {
     }
     for (int i = 0; i < 3 && margin_high.size() > 0 && high - low > kCutShare; ++i) {
       // The first root of the margins' chords; a little to its sides, so that both ends close in.
-      const double root = RootOf(margin_low, margin_high, &cut.bound);
+      const double root = Root(margin_low, margin_high, &cut.bound);
       const double s =
           low + std::clamp(root + (i % 2 == 1 ? 0.02 : -0.02), 0.001, 0.999) * (high - low);
       if (!close(s)) break;
@@ -455,10 +491,18 @@ class Flooder {
       if (in) from = at;
     }
     cut.share = margin_high.size() > 0
-                    ? low + RootOf(margin_low, margin_high, &cut.bound) * (high - low)
+                    ? low + Root(margin_low, margin_high, &cut.bound) * (high - low)
                 : std::isfinite(fold) ? std::clamp(fold, low, 1.0)
                                       : low;
     return cut;
+  }
+  // Of the best of some poses, the least margin alone is continuous.
+  [[nodiscard]] double Root(const VecX& low, const VecX& high, int* bound) const {
+    if (!fibre_.any() || space_.settings().for_all) return RootOf(low, high, bound);
+    Eigen::Index worst = 0;
+    const double out = high.minCoeff(&worst), in = low.minCoeff();
+    *bound = static_cast<int>(worst);
+    return in / (in - out);
   }
   [[nodiscard]] static double RootOf(const VecX& low, const VecX& high, int* bound) {
     double root = 1.0;
@@ -646,6 +690,7 @@ class Flooder {
   const FloodSettings settings_;
   const std::function<void(double)>& progress_;
   const int k_;
+  const Fibre fibre_;
   FloodedSet set_;
   std::unordered_map<Lattice, Corner, LatticeHash> corners_;
   std::array<std::set<Lattice>, 6> cells_, refined_;  // by level: not refined; refined
@@ -664,6 +709,8 @@ FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodS
       settings.resolution > 0 ? settings.resolution : kUsualResolution.at(static_cast<size_t>(k));
   double cells = 1.0;
   long poses = 0;
+  const Fibre fibre(space.settings());
+  constexpr Fibre::Reach none = Fibre::Reach::kNone;
   for (int c = 0; c < k; ++c) {
     double reach = 0.0;
     for (const double sign : {-1.0, 1.0}) {
@@ -674,7 +721,13 @@ FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodS
         VecX target = at.pose.at;
         target[c] += sign * step;
         PlacedPose next;
-        if (!space.Close(at, target, &next) || next.pose.margin.minCoeff() < 0.0) break;
+        double at_start = 0.0;
+        const bool closes = fibre.any()
+                                ? fibre.At(space, at, target.head(k), &next, &at_start) != none
+                                : space.Close(at, target, &next);
+        if (!closes) break;
+        const bool all = fibre.any() && space.settings().for_all;
+        if ((all ? at_start : next.pose.margin.minCoeff()) < 0.0) break;
         at = std::move(next);
       }
       if (count == kMostStrides) {

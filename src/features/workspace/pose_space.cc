@@ -16,9 +16,9 @@
 namespace mbv {
 namespace {
 
-constexpr double kRank = 1e-9;     // pivots of A below this share of the first are zero
-constexpr double kWeakest = 1e-6;  // at this share of what it is at home a constraint is lost
-constexpr double kClosed = 1e-11;  // a last step [rad, characteristic lengths]
+constexpr double kRank = 1e-9;          // pivots of A below this share of the first are zero
+constexpr double kWeakest = 1e-6;       // at this share of what it is at home a constraint is lost
+constexpr double kNearlyClosed = 1e-7;  // the step after such a one has the size of rounding
 constexpr double kOpen = 1e-9;  // of rows that were redundant at home [rad, characteristic lengths]
 constexpr double kLongStep = 0.3;    // longer ones are cut [rad, characteristic lengths]
 constexpr double kTrusted = 0.5;     // a correction beyond this share of the step is not
@@ -245,10 +245,15 @@ bool PoseSpace::Correct(const PlacedPose& from, const VecX& target, double most,
   const auto d = static_cast<Eigen::Index>(settings_.coordinates.size());
   const Eigen::Index over = settings_.over;
   Rows rows;
-  double moved = 0.0;
+  double moved = 0.0, last = kNan;
   for (int i = 0; i < kMostIterations; ++i) {
     Evaluate(&to->pose, &rows);
     if (!Factor(&rows)) return false;
+    if (last < kNearlyClosed) {
+      // Rows that were redundant may open elsewhere.
+      const double open = rows.r.size() > 0 ? rows.r.cwiseAbs().maxCoeff() : 0.0;
+      return open <= kOpen && Finish(from.N, &rows, to);
+    }
     VecX step = VecX::Zero(tree_.dofs());
     if (rank_ > 0) {
       const VecX wanted = rows.qr.colsPermutation().transpose() * VecX(-rows.r);
@@ -283,13 +288,7 @@ bool PoseSpace::Correct(const PlacedPose& from, const VecX& target, double most,
     if (moved > most) return false;
     Move(step, &to->pose);
     to->pose.at = rows.at;
-    if (size < kClosed) {
-      Evaluate(&to->pose, &rows);
-      // Rows that were redundant may open elsewhere.
-      const double open = rows.r.size() > 0 ? rows.r.cwiseAbs().maxCoeff() : 0.0;
-      if (!Factor(&rows) || open > kOpen) return false;
-      return Finish(from.N, &rows, to);
-    }
+    last = size;
   }
   return false;
 }

@@ -47,13 +47,21 @@ struct JointCone {
   double angle = kNan;        ///< [rad], 0 … π
 };
 
+/// A held coordinate that is asked for a range of values instead.
+struct RangedCoordinate {
+  int coordinate = -1;    ///< of SpaceSettings::coordinates
+  CoordinateRange range;  ///< finite [m or rad]
+};
+
 struct SpaceSettings {
   std::vector<NamedCoordinate> coordinates;  ///< d, independent at home: the free ones first
   int over = 0;                              ///< number of those that are free, 1 … 3
   VecX held;                                 ///< values of the others [m or rad]
   std::vector<CoordinateRange> box;          ///< per free coordinate
   std::vector<JointCone> cones;
-  bool cross_type2 = false;  ///< drives that lose their hold end nothing
+  bool cross_type2 = false;              ///< drives that lose their hold end nothing
+  std::vector<RangedCoordinate> ranged;  ///< fibre.h
+  bool for_all = false;                  ///< of them, or for some
 };
 
 /// A pose that closes. Poses of one PoseSpace and of its sections are alike.

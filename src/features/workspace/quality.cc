@@ -18,10 +18,12 @@
 namespace mbv {
 namespace {
 
-constexpr double kRankShare = 1e-9;       // smaller singular values are none
-constexpr double kSingularShare = 1e-12;  // of D: no (1)
-constexpr double kStiffnessStep = 1e-5;   // [rad, characteristic lengths]
-constexpr Eigen::Index kMostDrives = 12;  // of corners
+constexpr double kRankShare = 1e-9;                        // smaller singular values are none
+constexpr double kSingularShare = 1e-12;                   // of D: no (1)
+constexpr double kStiffnessStep = 1e-5;                    // [rad, characteristic lengths]
+constexpr Eigen::Index kMostDrives = 12;                   // of corners
+constexpr double kMostVertices = 4096, kMostFacets = 256;  // of redundant drives
+constexpr Eigen::Index kMostHullVertices = 100;            // corners in three dimensions
 
 // Reach of {K ṁ : |ṁ_i| ≤ 1} within the space that K spans: least and largest.
 std::pair<double, double> ZonotopeReach(const MatX& K) {
@@ -54,6 +56,30 @@ std::pair<double, double> ZonotopeReach(const MatX& K) {
   return {least, most};
 }
 
+// All ways to choose `count` of n.
+template <typename F>
+void ForEachChoice(Eigen::Index n, Eigen::Index count, const F& f) {
+  std::vector<Eigen::Index> chosen(static_cast<size_t>(count));
+  const auto next = [&](auto&& self, size_t depth, Eigen::Index from) -> void {
+    if (depth == chosen.size()) {
+      f(chosen);
+      return;
+    }
+    for (Eigen::Index i = from; i < n; ++i) {
+      chosen[depth] = i;
+      self(self, depth + 1, i + 1);
+    }
+  };
+  next(next, 0, 0);
+}
+double Choices(Eigen::Index n, Eigen::Index count) {
+  double ways = 1.0;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    ways *= static_cast<double>(n - k) / static_cast<double>(k + 1);
+  }
+  return ways;
+}
+
 // Reach of {f : |k_i·f| ≤ 1} within the space that the k_i (columns) span.
 std::pair<double, double> PolytopeReach(const MatX& K) {
   const Eigen::JacobiSVD<MatX> svd(K, Eigen::ComputeThinU);
@@ -64,28 +90,88 @@ std::pair<double, double> PolytopeReach(const MatX& K) {
   const Eigen::Index n = G.cols();
   const double least = 1.0 / G.colwise().norm().maxCoeff();
   double most = 0.0;
-  std::vector<Eigen::Index> chosen(static_cast<size_t>(rank));
-  const auto corners = [&](auto&& self, size_t depth, Eigen::Index from) -> void {
-    if (depth == chosen.size()) {
-      MatX A(rank, rank);
-      for (Eigen::Index r = 0; r < rank; ++r) A.row(r) = G.col(chosen[static_cast<size_t>(r)]);
-      const Eigen::FullPivLU<MatX> lu(A);
-      if (!lu.isInvertible()) return;
-      for (int signs = 0; signs < (1 << rank); ++signs) {
-        VecX b(rank);
-        for (Eigen::Index r = 0; r < rank; ++r) b[r] = (signs >> r) & 1 ? 1.0 : -1.0;
-        const VecX f = lu.solve(b);
-        if ((G.transpose() * f).cwiseAbs().maxCoeff() < 1.0 + 1e-9) most = std::max(most, f.norm());
-      }
-      return;
+  ForEachChoice(n, rank, [&](const std::vector<Eigen::Index>& chosen) {
+    MatX A(rank, rank);
+    for (Eigen::Index r = 0; r < rank; ++r) A.row(r) = G.col(chosen[static_cast<size_t>(r)]);
+    const Eigen::FullPivLU<MatX> lu(A);
+    if (!lu.isInvertible()) return;
+    for (int signs = 0; signs < (1 << rank); ++signs) {
+      VecX b(rank);
+      for (Eigen::Index r = 0; r < rank; ++r) b[r] = (signs >> r) & 1 ? 1.0 : -1.0;
+      const VecX f = lu.solve(b);
+      if ((G.transpose() * f).cwiseAbs().maxCoeff() < 1.0 + 1e-9) most = std::max(most, f.norm());
     }
-    for (Eigen::Index i = from; i < n; ++i) {
-      chosen[depth] = i;
-      self(self, depth + 1, i + 1);
-    }
-  };
-  corners(corners, 0, 0);
+  });
   return {least, most};
+}
+
+// Reach of {W y : |A y| ≤ 1} within the space that W spans: least and largest. More rows than
+// columns; NaN of too many.
+std::pair<double, double> ImageReach(const MatX& A, const MatX& W) {
+  const Eigen::Index n = A.cols();
+  if (Choices(A.rows(), n) * std::exp2(n) > kMostVertices) return {kNan, kNan};
+  const Eigen::JacobiSVD<MatX> svd(W, Eigen::ComputeThinU);
+  const VecX sigma = svd.singularValues();
+  if (!(sigma[0] > 0.0)) return {0.0, 0.0};
+  const auto rank = (sigma.array() > kRankShare * sigma[0]).count();
+  const MatX G = svd.matrixU().leftCols(rank).transpose() * W;
+  std::vector<VecX> corners;
+  ForEachChoice(A.rows(), n, [&](const std::vector<Eigen::Index>& rows) {
+    MatX B(n, n);
+    for (Eigen::Index r = 0; r < n; ++r) B.row(r) = A.row(rows[static_cast<size_t>(r)]);
+    const Eigen::FullPivLU<MatX> lu(B);
+    if (!lu.isInvertible()) return;
+    for (long signs = 0; signs < (1L << n); ++signs) {
+      VecX b(n);
+      for (Eigen::Index r = 0; r < n; ++r) b[r] = (signs >> r) & 1 ? 1.0 : -1.0;
+      const VecX y = lu.solve(b);
+      if ((A * y).cwiseAbs().maxCoeff() < 1.0 + 1e-9) corners.emplace_back(G * y);
+    }
+  });
+  double most = 0.0, least = std::numeric_limits<double>::infinity();
+  for (const VecX& corner : corners) most = std::max(most, corner.norm());
+  if (rank == 1) return {most, most};
+  const auto count = static_cast<Eigen::Index>(corners.size());
+  if (rank == 3 && count > kMostHullVertices) return {kNan, most};
+  // Planes through corners with all others on one side.
+  ForEachChoice(count, rank, [&](const std::vector<Eigen::Index>& of) {
+    const auto corner = [&](size_t k) -> const VecX& {
+      return corners[static_cast<size_t>(of[k])];
+    };
+    const VecX edge = corner(1) - corner(0);
+    VecX normal = rank == 2 ? VecX(Eigen::Vector2d(-edge[1], edge[0]))
+                            : VecX(Vec3(edge).cross(Vec3(corner(2) - corner(0))));
+    if (!(normal.norm() > kRankShare * std::pow(most, static_cast<double>(rank - 1)))) return;
+    normal.normalize();
+    const double offset = std::abs(normal.dot(corner(0)));
+    if (offset >= least) return;
+    for (const VecX& other : corners) {
+      if (std::abs(normal.dot(other)) > offset + 1e-9 * most) return;
+    }
+    least = offset;
+  });
+  return {least, most};
+}
+
+// Normals of the facets of {Dᵀτ : |τ_i| ≤ t_i}: each is orthogonal to n − 1 rows of D. Of as many
+// drives as motions each drive's motion alone. Empty of too many.
+MatX ForceNormals(const MatX& D) {
+  const Eigen::Index n = D.cols();
+  if (D.rows() == n) return D.inverse();
+  if (n == 1) return MatX::Ones(1, 1);
+  if (Choices(D.rows(), n - 1) > kMostFacets) return MatX(n, 0);
+  std::vector<VecX> normals;
+  ForEachChoice(D.rows(), n - 1, [&](const std::vector<Eigen::Index>& rows) {
+    MatX B(n - 1, n);
+    for (Eigen::Index r = 0; r + 1 < n; ++r) {
+      B.row(r) = D.row(rows[static_cast<size_t>(r)]).normalized();
+    }
+    const MatX kernel = Eigen::FullPivLU<MatX>(B).kernel();
+    if (kernel.cols() == 1) normals.emplace_back(kernel.col(0).normalized());
+  });
+  MatX Y(n, static_cast<Eigen::Index>(normals.size()));
+  for (size_t k = 0; k < normals.size(); ++k) Y.col(static_cast<Eigen::Index>(k)) = normals[k];
+  return Y;
 }
 
 struct Limits {
@@ -131,11 +217,9 @@ class QualityMapper {
   }
 
   [[nodiscard]] std::string WhyNone() const {
-    if (dofs_ == static_cast<Eigen::Index>(mechanism_.drives.size())) return "";
-    return fmt::format(
-        "{} drives for {} degrees of freedom: qualities are those of mechanisms with "
-        "as many drives",
-        mechanism_.drives.size(), dofs_);
+    if (dofs_ <= static_cast<Eigen::Index>(mechanism_.drives.size())) return "";
+    return fmt::format("{} drives for {} degrees of freedom: they do not hold the mechanism",
+                       mechanism_.drives.size(), dofs_);
   }
   [[nodiscard]] const std::vector<QualityIndex>& indices() const { return indices_; }
 
@@ -149,52 +233,70 @@ class QualityMapper {
     const MatX D = DriveRates(states, T);
     const MatX W = TwistOf(output_.body, output_.X_BO.translation(), states, T) -
                    TwistOf(output_.reference_body, ReferencePoint(states), states, T);
-    VecX unit(n);
-    for (Eigen::Index k = 0; k < n; ++k) unit[k] = drive_unit_[static_cast<size_t>(k)];
-    const Eigen::JacobiSVD<MatX> check(unit.asDiagonal() * D);
-    const VecX sizes = check.singularValues();
+    const Eigen::Map<const VecX> unit(drive_unit_.data(), D.rows());
+    const MatX counted = unit.asDiagonal() * D;
+    const VecX sizes = Eigen::JacobiSVD<MatX>(counted).singularValues();
     size_t i = 0;
     const auto put = [&](double value) { (*values)[static_cast<Eigen::Index>(i++)] = value; };
     if (!(sizes[n - 1] > kSingularShare * sizes[0])) {
       put(0.0);
       return true;
     }
-    const MatX back = D.partialPivLu().inverse();
-    const MatX K = W * back;
+    // Motions at unit speed of the drives together, |U D y| = 1: y = back z, |z| = 1.
+    const MatX R = Eigen::HouseholderQR<MatX>(counted).matrixQR().topRows(n);
+    const MatX back = R.triangularView<Eigen::Upper>().solve(MatX::Identity(n, n));
     // (4)
     MatX S(3 * static_cast<Eigen::Index>(points_.size()), n);
     for (size_t p = 0; p < points_.size(); ++p) {
       S.middleRows<3>(3 * static_cast<Eigen::Index>(p)) =
           TwistOf(output_.body, points_[p], states, T).bottomRows<3>();
     }
-    S *= back * unit.cwiseInverse().asDiagonal() / std::sqrt(static_cast<double>(points_.size()));
+    S *= back / std::sqrt(static_cast<double>(points_.size()));
     const VecX rms = Eigen::JacobiSVD<MatX>(S).singularValues();
     put(rms[0] > 0.0 ? 1.0 / rms[0] : kNan);
-    put(Eigen::JacobiSVD<MatX>(CoordinateRates(states, T) * back * unit.cwiseInverse().asDiagonal())
-            .singularValues()
-            .minCoeff());
+    put(Eigen::JacobiSVD<MatX>(CoordinateRates(states, T) * back).singularValues().minCoeff());
     // Twists with lengths by the characteristic one, drives in units of theirs.
-    MatX scaled = K * unit.cwiseInverse().asDiagonal();
+    MatX scaled = W * back;
     scaled.topRows<3>() *= length_;
     const VecX sigma = Eigen::JacobiSVD<MatX>(scaled).singularValues();
     const auto rank = (sigma.array() > kRankShare * sigma[0]).count();
     put(rank == n ? sigma[0] / sigma[n - 1] : kNan);
     put(rank == n ? sigma.prod() : 0.0);
-    const MatX by_speed = K * limits_.speed.asDiagonal();
-    const MatX by_force = K * limits_.force.cwiseInverse().asDiagonal();
+    // (3), (8)
+    const MatX Y = ForceNormals(D);
+    const VecX reach = (D * Y).cwiseAbs().transpose() * limits_.force;
+    const MatX by_force = W * Y * reach.cwiseInverse().asDiagonal();
+    const MatX by_speed = limits_.speed.cwiseInverse().asDiagonal() * D;
     for (const bool translation : {true, false}) {
       const Eigen::Index first = translation ? 3 : 0;
-      const auto [slow, fast] = ZonotopeReach(by_speed.middleRows<3>(first));
-      const auto [weak, strong] = PolytopeReach(by_force.middleRows<3>(first));
+      const MatX part = W.middleRows<3>(first);
+      const auto [slow, fast] =
+          redundant() ? ImageReach(by_speed, part) : ZonotopeReach(part * by_speed.inverse());
+      const auto [weak, strong] =
+          Y.cols() > 0 ? PolytopeReach(by_force.middleRows<3>(first)) : std::pair(kNan, kNan);
       for (const double value : {slow, fast, weak, strong}) put(value);
     }
     // (5)
     MatX M = T.transpose() * internal::Momenta(mechanism_, states, T);
-    M = back.transpose() * (0.5 * (M + M.transpose())) * back;
-    for (Eigen::Index k = 0; k < n; ++k) put(M(k, k));
-    const VecX held = HoldingForces(states, T, back);
-    if (limits_.forces) put(Payload(held, -K.bottomRows<3>().transpose() * mechanism_.gravity_W));
-    if (servos_) put(Frequency(at, T, D, M));
+    M = 0.5 * (M + M.transpose()).eval();
+    if (!redundant()) {
+      const MatX alone = D.inverse();
+      for (Eigen::Index k = 0; k < n; ++k) put(alone.col(k).dot(M * alone.col(k)));
+    }
+    if (limits_.forces) {
+      const VecX per_mass = -W.bottomRows<3>().transpose() * mechanism_.gravity_W;
+      put(Y.cols() > 0
+              ? Payload(Y.transpose() * ForcesAtRest(states, T), Y.transpose() * per_mass, reach)
+              : kNan);
+    }
+    if (servos_) {
+      const std::optional<MatX> stiffness = Stiffness(at, states, T, D);
+      put(stiffness ? Frequency(*stiffness, M) : kNan);
+      const auto [soft, stiff] =
+          stiffness ? OutputStiffness(*stiffness, W.bottomRows<3>()) : std::pair(kNan, kNan);
+      put(soft);
+      put(stiff);
+    }
     return true;
   }
 
@@ -240,13 +342,15 @@ class QualityMapper {
     }
     return C;
   }
-  // Of the drives at rest, beyond no load; friction at rest counts as 0.
-  [[nodiscard]] VecX HoldingForces(const BodyStates& states, const MatX& T,
-                                   const MatX& back) const {
+  [[nodiscard]] bool redundant() const {
+    return dofs_ < static_cast<Eigen::Index>(mechanism_.drives.size());
+  }
+  // By the motions, beyond no load; friction at rest counts as 0.
+  [[nodiscard]] VecX ForcesAtRest(const BodyStates& states, const MatX& T) const {
     std::vector<Vec6> required;
     internal::RequiredWrenches(mechanism_, states, {},
                                std::vector<int>(mechanism_.elements.size(), 0), &required);
-    return back.transpose() * (T.transpose() * internal::Stack(required));
+    return T.transpose() * internal::Stack(required);
   }
 
   void FindPoints() {
@@ -286,11 +390,17 @@ class QualityMapper {
     Add("moment_least", "N m", "about every axis, " + force);
     Add("moment_most", "N m", "about the best axis, " + force);
     for (const Drive& drive : mechanism_.drives) {
+      if (redundant()) break;  // none moves alone
       Add("mass_" + drive.name, PositionUnit(mechanism_, drive) == "m" ? "kg" : "kg m²",
           "as the drive feels it, the others at rest", false);
     }
     if (limits_.forces) Add("payload", "kg", "at the output's origin, held by the motors");
-    if (servos_) Add("frequency", "Hz", "lowest natural frequency on the servos");
+    if (servos_) {
+      Add("frequency", "Hz", "lowest natural frequency on the servos");
+      Add("stiffness_least", "N/m",
+          "at the output's origin on the servos, in the softest direction");
+      Add("stiffness_most", "N/m", "in the stiffest direction that it moves in");
+    }
   }
 
   // World twist of a body's point: 6 × n.
@@ -311,48 +421,68 @@ class QualityMapper {
   }
 
   // (7)
-  [[nodiscard]] double Payload(const VecX& held, const VecX& per_mass) const {
+  [[nodiscard]] static double Payload(const VecX& held, const VecX& per_mass, const VecX& limit) {
     double most = std::numeric_limits<double>::infinity();
     for (Eigen::Index k = 0; k < held.size(); ++k) {
-      const double left = limits_.force[k] - std::abs(held[k]);
-      if (left < 0.0) return 0.0;
-      if (per_mass[k] == 0.0) continue;
-      const double room =
-          per_mass[k] > 0.0 ? limits_.force[k] - held[k] : limits_.force[k] + held[k];
+      if (limit[k] < std::abs(held[k])) return 0.0;
+      // Of rounding: a facet that the load does not press on.
+      if (std::abs(per_mass[k]) <= kRankShare * per_mass.cwiseAbs().maxCoeff()) continue;
+      const double room = per_mass[k] > 0.0 ? limit[k] - held[k] : limit[k] + held[k];
       most = std::min(most, room / std::abs(per_mass[k]));
     }
     return std::isfinite(most) ? most : kNan;
   }
 
-  // (6), with steps of the motions N carried over to the drives.
-  [[nodiscard]] double Frequency(const PlacedPose& at, const MatX& T, const MatX& D,
-                                 const MatX& M) const {
+  // (6) by the motions N: what the servos, weight and springs do against a small one. Drives keep
+  // the forces of least norm that hold the pose, servos add theirs.
+  [[nodiscard]] std::optional<MatX> Stiffness(const PlacedPose& at, const BodyStates& states,
+                                              const MatX& T, const MatX& D) const {
     const Eigen::Index n = T.cols();
-    if (at.N_free.cols() != n) return kNan;  // prescribed joints
-    MatX slope(n, n);
+    if (at.N_free.cols() != n) return std::nullopt;  // prescribed joints
+    const VecX held = D * (D.transpose() * D).ldlt().solve(ForcesAtRest(states, T));
+    MatX K(n, n);
     for (Eigen::Index k = 0; k < n; ++k) {
       std::array<VecX, 2> force;
       for (size_t s = 0; s < 2; ++s) {
         PlacedPose there;
         if (!space_.Step(at, (s == 0 ? -kStiffnessStep : kStiffnessStep) * VecX::Unit(n, k),
                          &there)) {
-          return kNan;
+          return std::nullopt;
         }
-        const BodyStates states = space_.States(there.pose);
-        const MatX T_there = Motions(there, states);
-        force.at(s) = HoldingForces(states, T_there, DriveRates(states, T_there).inverse());
+        const BodyStates moved = space_.States(there.pose);
+        const MatX T_there = Motions(there, moved);
+        // By N there, then by N here.
+        const VecX open =
+            ForcesAtRest(moved, T_there) - DriveRates(moved, T_there).transpose() * held;
+        force.at(s) = (there.N.transpose() * at.N).transpose() * open;
       }
-      slope.col(k) = (force[1] - force[0]) / (2 * kStiffnessStep);
+      K.col(k) = (force[1] - force[0]) / (2 * kStiffnessStep);
     }
-    MatX K = slope * D.inverse();
     K = 0.5 * (K + K.transpose()).eval();
-    for (Eigen::Index d = 0; d < n; ++d) {
-      K(d, d) += mechanism_.drives[static_cast<size_t>(d)].stiffness;
+    for (Eigen::Index d = 0; d < D.rows(); ++d) {
+      K += mechanism_.drives[static_cast<size_t>(d)].stiffness * D.row(d).transpose() * D.row(d);
     }
+    return K;
+  }
+  [[nodiscard]] static double Frequency(const MatX& K, const MatX& M) {
     const Eigen::GeneralizedSelfAdjointEigenSolver<MatX> modes(K, M, Eigen::EigenvaluesOnly);
     if (modes.info() != Eigen::Success) return kNan;
     const double lowest = modes.eigenvalues()[0];
     return lowest > 0.0 ? std::sqrt(lowest) / (2 * std::numbers::pi) : 0.0;
+  }
+  // (9): least and largest, of the directions that the output can move in; 0 of a pose that falls.
+  [[nodiscard]] static std::pair<double, double> OutputStiffness(const MatX& K, const MatX& W) {
+    const Eigen::LLT<MatX> llt(K);
+    if (llt.info() != Eigen::Success) return {0.0, 0.0};
+    const Eigen::SelfAdjointEigenSolver<Mat3> soft(Mat3(W * llt.solve(W.transpose())),
+                                                   Eigen::EigenvaluesOnly);
+    const Vec3 sizes = soft.eigenvalues();
+    if (!(sizes[2] > 0.0)) return {kNan, kNan};
+    double least = sizes[2];
+    for (int k = 2; k >= 0; --k) {
+      if (sizes[k] > kRankShare * sizes[2]) least = sizes[k];
+    }
+    return {1.0 / sizes[2], 1.0 / least};
   }
 
   const PoseSpace& space_;

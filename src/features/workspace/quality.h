@@ -7,9 +7,13 @@
 //   V(y)² = mean of |v|² over the points where joints hold the output's body, ṁ(y) with angles
 //       by the characteristic length: type-2 distance min |ṁ|/V; type-1 distance min |ẋ|/|ṁ| with
 //       the set's coordinates x, angles by that length, too                                    (4)
-//   M_d = D⁻ᵀ M D⁻¹   mass matrix as the drives feel it (5) det(K_d − ω² M_d) = 0, K_d = ∂(drive
-//   forces at rest)/∂m + servos' stiffness                  (6) |τ_g + m Kᵀ g| ≤ t: the payload m
-//   at the output's origin that motors hold                    (7)
+//   M_d = D⁻ᵀ M D⁻¹   mass matrix as the drives feel it                                      (5)
+//   det(K_y − ω² M) = 0, K_y = ∂(forces at rest by the motions)/∂y + Dᵀ k D, k of the servos (6)
+//   |τ_g + m Kᵀ g| ≤ t: the payload m at the output's origin that motors hold                 (7)
+//   More drives than degrees of freedom: speeds {W y : |D y| ≤ s}; forces that some τ holds,
+//   Wᵀ w ∈ {Dᵀτ : |τ| ≤ t}, a zonotope: |wᵀ W y_k| ≤ Σ t_i |D_i y_k| by its facets' normals y_k
+//   [Bouchard, Gosselin, Moore 2010]; its load in (7) likewise                               (8)
+//   W_t K_y⁻¹ W_tᵀ    compliance of the output's origin                                      (9)
 //
 // The type-2 distance measures points of the body alone: it depends on no frame [Voglewede,
 // Ebert-Uphoff 2005].

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "base/text.h"
+#include "features/workspace/fibre.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
 #include "model_file/yaml/units.h"
@@ -23,6 +24,7 @@ using std::numbers::pi;
 constexpr size_t kMostNamed = 8;         // names in a message
 constexpr double kSingularHome = 1e-10;  // determinants of orthonormal motions below it are zero
 constexpr size_t kMostChecked = 24;
+constexpr double kVolumeShare = 1e-8;
 constexpr double kSamePose = 1e-8;  // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 
@@ -52,12 +54,14 @@ class QuestionReader {
     }
     ReadOver();
     ReadHeld();
+    ReadRanged();
     ReadFrom();
     ReadRanges();
     ReadCones();
     if (failed_ || !Choose()) return std::nullopt;
     question_.output = output_;
-    question_.ranges_changed = !arguments_.ranges.empty() || !arguments_.cones.empty();
+    question_.ranges_changed =
+        !arguments_.ranges.empty() || !arguments_.cones.empty() || !ranged_.empty();
     return std::move(question_);
   }
 
@@ -188,6 +192,38 @@ class QuestionReader {
     }
   }
 
+  // What is held at all, or some, values of a range.
+  void ReadRanged() {
+    if (!arguments_.for_all.empty() && !arguments_.for_some.empty()) {
+      Error("--for-some", "--for-all is stated, too", "one of them");
+    }
+    for (const auto& [option, texts] : {std::pair("--for-all", &arguments_.for_all),
+                                        std::pair("--for-some", &arguments_.for_some)}) {
+      for (const std::string& text : *texts) {
+        const auto assigned = Split(option, text, 2, false);
+        if (!assigned) continue;
+        const NamedCoordinate* found = Find(assigned->name);
+        if (held_.contains(found->name) ||
+            std::ranges::find(over_, found->name, &NamedCoordinate::name) != over_.end()) {
+          Error(assigned->text, "'" + found->name + "' is stated twice",
+                "--over frees a coordinate, --at holds it, --for-all and --for-some ask a range");
+          continue;
+        }
+        const CoordinateRange range = {assigned->values[0], assigned->values[1]};
+        const double home = HomeValue(question_.mechanism, found->coordinate);
+        at_.push_back(*found);
+        held_[found->name] =
+            range.lower <= home && home <= range.upper ? home : 0.5 * (range.lower + range.upper);
+        ranged_[found->name] = range;
+      }
+    }
+    question_.settings.for_all = !arguments_.for_all.empty();
+    if (!ranged_.empty() && over_.size() > 2) {
+      Error("--over", "a range of further coordinates is asked of one or two free ones",
+            "hold one of the coordinates by --at");
+    }
+  }
+
   void ReadFrom() {
     for (const std::string& text : arguments_.from) {
       const auto assigned = Split("--from", text, 1, false);
@@ -276,7 +312,7 @@ class QuestionReader {
     for (const size_t k : choice.chosen) {
       const bool angle = k >= held && candidates[k].coordinate.component >= 3;
       // Angles only where no length is free.
-      if (k < held || over_.size() == 3 ||
+      if (k < held || over_.size() == (ranged_.empty() ? 3 : 2) ||
           (angle && !over_.empty() && over_.back().coordinate.component < 3)) {
         continue;
       }
@@ -370,6 +406,9 @@ class QuestionReader {
         }
       }
       question_.start[k] = value;
+      if (const auto at = ranged_.find(named.name); at != ranged_.end()) {
+        settings.ranged.push_back({static_cast<int>(k), at->second});
+      }
     }
     settings.box = box;
     settings.held = question_.start.tail(d - settings.over);
@@ -390,6 +429,7 @@ class QuestionReader {
   std::vector<NamedCoordinate> known_, over_, at_;
   std::vector<CoordinateRange> box_;
   std::map<std::string, double> held_, from_;
+  std::map<std::string, CoordinateRange> ranged_;
   bool failed_ = false;
 };
 
@@ -576,6 +616,8 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
   result.drives = static_cast<int>(m.drives.size());
   result.start = question.start;
   result.box = settings.box;
+  result.ranged = settings.ranged;
+  result.for_all = settings.for_all;
   result.held_values = settings.held;
   for (size_t k = 0; k < settings.coordinates.size(); ++k) {
     const bool free = static_cast<int>(k) < settings.over;
@@ -622,10 +664,13 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     return result;
   }
   // Both ways at once; neither knows of the other.
-  FloodSettings flood = arguments.flood;
+  const FloodSettings& flood = arguments.flood;
   std::atomic<double> of_trace = 0.0, of_flood = 0.0;
   const auto trace = [&] {
-    result.traced = TraceSet(space, start, [&](double f) { of_trace = f; });
+    const auto report = [&](double f) { of_trace = f; };
+    result.traced = settings.ranged.empty()
+                        ? TraceSet(space, start, report, kVolumeShare, flood.threads)
+                        : TraceRange(space, start, flood.threads, report);
     of_trace = 1.0;
   };
   const auto fill = [&] {
@@ -634,9 +679,7 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
   };
   std::vector<std::future<void>> ways;
   const auto policy = flood.threads > 1 ? std::launch::async : std::launch::deferred;
-  // The flood has what tracing leaves of the processors.
   ways.push_back(std::async(policy, trace));
-  flood.threads = std::max(1, flood.threads - 1);
   ways.push_back(std::async(policy, fill));
   for (std::future<void>& way : ways) {
     while (way.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout) {

@@ -18,13 +18,14 @@ namespace mbv {
 /// As a user writes it. Coordinates are the output's x … yaw, or named as in Model::coordinates();
 /// names may end in a unit (_mm, _deg).
 struct SetArguments {
-  std::string output;                ///< "": the first one
-  std::vector<std::string> over;     ///< "x", "x_mm=-100:100"
-  std::vector<std::string> at;       ///< "z=-0.165": held there; what is left stays at home
-  std::vector<std::string> from;     ///< "x=0.1": a pose of the set, where home is none
-  std::vector<std::string> ranges;   ///< "leg1=0.5:0.75": instead of the model's
-  std::vector<std::string> cones;    ///< "ball_deg=30", "ball.x_deg=30": of the axis z, or x or y
-  bool cross_singularities = false;  ///< type 2 ends nothing
+  std::string output;               ///< "": the first one
+  std::vector<std::string> over;    ///< "x", "x_mm=-100:100"
+  std::vector<std::string> at;      ///< "z=-0.165": held there; what is left stays at home
+  std::vector<std::string> from;    ///< "x=0.1": a pose of the set, where home is none
+  std::vector<std::string> ranges;  ///< "leg1=0.5:0.75": instead of the model's
+  std::vector<std::string> cones;   ///< "ball_deg=30", "ball.x_deg=30": of the axis z, or x or y
+  std::vector<std::string> for_all, for_some;  ///< "yaw_deg=-10:10": fibre.h
+  bool cross_singularities = false;            ///< type 2 ends nothing
   FloodSettings flood;
 
   [[nodiscard]] bool any() const {
@@ -33,7 +34,8 @@ struct SetArguments {
   }
   /// What one pose has no use for.
   [[nodiscard]] bool any_of_set() const {
-    return !cones.empty() || cross_singularities || flood.resolution > 0;
+    return !cones.empty() || !for_all.empty() || !for_some.empty() || cross_singularities ||
+           flood.resolution > 0;
   }
 };
 
@@ -62,6 +64,8 @@ struct ReachableSet {
   VecX held_values, start;
   SpacePose start_pose;
   std::vector<CoordinateRange> box;
+  std::vector<RangedCoordinate> ranged;  ///< of over, then held
+  bool for_all = false;
   double length = kNan;  ///< characteristic [m]
   int dofs = 0, drives = 0;
   std::vector<SetBound> bounds;

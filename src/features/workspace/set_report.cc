@@ -53,9 +53,31 @@ std::string PlaceText(const ReachableSet& set, const Vec3& at) {
   return Joined(parts);
 }
 
+// Of a held coordinate that is asked for a range.
+const CoordinateRange* RangeOf(const ReachableSet& set, size_t held) {
+  for (const RangedCoordinate& ranged : set.ranged) {
+    if (ranged.coordinate == static_cast<int>(set.over.size() + held)) return &ranged.range;
+  }
+  return nullptr;
+}
+
+// " for all yaw -10 … 10 °".
+std::string RangedText(const ReachableSet& set) {
+  std::vector<std::string> parts;
+  for (size_t k = 0; k < set.held.size(); ++k) {
+    const CoordinateRange* range = RangeOf(set, k);
+    if (range == nullptr) continue;
+    const std::string& unit = set.held_units[k];
+    parts.push_back(fmt::format("{} {:.5g} … {:.5g} {}", set.held[k], Shown(range->lower, unit),
+                                Shown(range->upper, unit), ShownUnit(unit)));
+  }
+  return parts.empty() ? "" : (set.for_all ? " for all " : " for some ") + Joined(parts);
+}
+
 std::string HeldText(const ReachableSet& set) {
   std::vector<std::string> parts;
   for (size_t k = 0; k < set.held.size(); ++k) {
+    if (RangeOf(set, k) != nullptr) continue;
     const std::string& unit = set.held_units[k];
     const double value = Shown(set.held_values[static_cast<Eigen::Index>(k)], unit);
     parts.push_back(fmt::format("{} = {:.5g} {}", set.held[k],
@@ -66,8 +88,9 @@ std::string HeldText(const ReachableSet& set) {
 
 std::string HeadLine(const SetReport& report) {
   const ReachableSet& set = report.set;
-  return fmt::format("reachable {} over {}{}", set.measure, Joined(set.over),
-                     set.held.empty() ? "" : " at " + HeldText(set));
+  const std::string held = HeldText(set);
+  return fmt::format("reachable {} over {}{}{}", set.measure, Joined(set.over), RangedText(set),
+                     held.empty() ? "" : " at " + held);
 }
 
 Table WaysTable(const SetReport& report) {
@@ -81,7 +104,10 @@ Table WaysTable(const SetReport& report) {
     table.rows.push_back(
         {way, WithError(value, error), fmt::format("{}", closings), fmt::format("{:.2f}", wall)});
   };
-  row(set.over.size() == 1 ? "path to both ends" : "boundary, traced and integrated",
+  row(!set.ranged.empty()
+          ? set.for_all ? "sections of the range, intersected" : "sections of the range, united"
+      : set.over.size() == 1 ? "path to both ends"
+                             : "boundary, traced and integrated",
       set.traced.measure, set.traced.error, set.traced.closings, set.traced.wall_s);
   row("flooded lattice", set.flooded.measure, set.flooded.error, set.flooded.closings,
       set.flooded.wall_s);
@@ -312,6 +338,13 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
       "else is common. Error of the boundary: last coefficients of its polynomials, and of three "
       "dimensions the Gauss–Kronrod rule's; of the lattice: what the last halving changed, "
       "or half of the one before, and a quarter of the cells where bounds meet.");
+  if (!set.ranged.empty()) {
+    reached.Note(
+        "Of a range, sections at its values are intersected (all) or united (some), twice as many "
+        "until the measure rests: their error is the last change. The lattice goes through the "
+        "range at every corner. Qualities and poses are those at the value that is held, or the "
+        "best one.");
+  }
   Items notes{set.notes};
   if (set.checked + set.unchecked > 0) {
     notes.texts.push_back(fmt::format(
@@ -532,24 +565,36 @@ Json ToJson(const SetReport& report) {
                        {"most", Number(index.most)},
                        {"most_at", PlaceJson(set, index.most_at)}});
   }
-  return {{"over", std::move(coordinates)},
-          {"held", std::move(held)},
-          {"measure", set.measure},
-          {"unit", set.unit},
-          {"traced", {{"value", Number(set.traced.measure)}, {"error", Number(set.traced.error)}}},
-          {"flooded",
-           {{"value", Number(set.flooded.measure)},
-            {"error", Number(set.flooded.error)},
-            {"levels", std::move(levels)}}},
-          {"agree", report.agree()},
-          {"verdict", set.verdict},
-          {"bounds", std::move(bounds)},
-          {"notes", set.notes},
-          {"checked_poses", set.checked},
-          {"checked_difference", Number(set.checked_off)},
-          {"characteristic_length_m", Number(set.length)},
-          {"constraint_cells", report.constraint.size()},
-          {"quality", std::move(indices)}};
+  Json ranged = Json::array();
+  for (size_t k = 0; k < set.held.size(); ++k) {
+    const CoordinateRange* range = RangeOf(set, k);
+    if (range == nullptr) continue;
+    ranged.push_back({{"name", set.held[k]},
+                      {"unit", set.held_units[k]},
+                      {"low", range->lower},
+                      {"high", range->upper}});
+  }
+  Json json = {
+      {"over", std::move(coordinates)},
+      {"held", std::move(held)},
+      {"measure", set.measure},
+      {"unit", set.unit},
+      {"traced", {{"value", Number(set.traced.measure)}, {"error", Number(set.traced.error)}}},
+      {"flooded",
+       {{"value", Number(set.flooded.measure)},
+        {"error", Number(set.flooded.error)},
+        {"levels", std::move(levels)}}},
+      {"agree", report.agree()},
+      {"verdict", set.verdict},
+      {"bounds", std::move(bounds)},
+      {"notes", set.notes},
+      {"checked_poses", set.checked},
+      {"checked_difference", Number(set.checked_off)},
+      {"characteristic_length_m", Number(set.length)},
+      {"constraint_cells", report.constraint.size()},
+      {"quality", std::move(indices)}};
+  if (!set.ranged.empty()) json[set.for_all ? "for_all" : "for_some"] = std::move(ranged);
+  return json;
 }
 
 std::vector<std::pair<std::string, std::string>> SetFiles(const SetReport& report) {

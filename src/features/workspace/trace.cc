@@ -5,12 +5,15 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <chrono>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
+#include <thread>
+#include <utility>
 
 namespace mbv {
 namespace {
@@ -26,8 +29,12 @@ constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
 constexpr double kFar = 200.0;  // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000;
+constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
+constexpr int kSpreadRows = 6;
 constexpr int kRays = 8, kChords = 12;  // from home; from each loop
-constexpr int kMostSections = 1200;
+constexpr size_t kMostSections = 1200;
+constexpr long kEnoughClosings = 1000000;  // beyond, a volume has the error that it has
+constexpr size_t kNearSections = 2;        // on each side, whose poses begin another one
 
 // Root of a continuous function with different signs at both ends (Illinois), to rounding.
 template <typename F>
@@ -162,6 +169,10 @@ class Tracer {
     return slope.norm() > 0.0 ? VecX(slope.normalized()) : slope;
   }
   [[nodiscard]] bool Knows(const std::vector<TracedLoop>& loops, const Hit& hit) const;
+  /// Points that loops have inside, but the set has not, are in holes: their loops. False where
+  /// one is lost. Other points become poses.
+  bool Probe(const std::vector<Vec2>& points, TracedSection* section,
+             std::vector<SpacePose>* inside);
   /// All loops that rays and chords from these poses find.
   bool TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* section,
                 std::vector<SpacePose>* inside);
@@ -519,6 +530,80 @@ bool IsInside(const std::vector<TracedLoop>& loops, const Vec2& p) {
   return inside;
 }
 
+// All over a section; another one may lose the neck between two parts, or a hole.
+std::vector<Vec2> PointsIn(const TracedSection& section) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  const auto for_each_edge = [&](const auto& f) {
+    for (const TracedLoop& loop : section.loops) {
+      for (const TracedArc& arc : loop.arcs) {
+        for (size_t k = 1; k < arc.points.size(); ++k) f(arc.points[k - 1], arc.points[k]);
+      }
+    }
+  };
+  for_each_edge([&](const Vec2& a, const Vec2&) {
+    low = std::min(low, a[1]);
+    high = std::max(high, a[1]);
+  });
+  std::vector<Vec2> points;
+  for (int row = 0; row < kSpreadRows; ++row) {
+    const double y = low + (high - low) * (row + 0.5) / kSpreadRows;
+    std::vector<double> crossings;
+    for_each_edge([&](const Vec2& a, const Vec2& b) {
+      if ((a[1] > y) != (b[1] > y)) {
+        crossings.push_back(a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]));
+      }
+    });
+    std::ranges::sort(crossings);
+    for (size_t k = 0; k + 1 < crossings.size(); k += 2) {
+      for (const double share : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+        points.emplace_back(crossings[k] + share * (crossings[k + 1] - crossings[k]), y);
+      }
+    }
+  }
+  return points;
+}
+std::vector<Vec2> MiddlesOfHoles(const TracedSection& section) {
+  std::vector<Vec2> middles;
+  for (const TracedLoop& loop : section.loops) {
+    if (loop.area >= 0.0) continue;
+    Vec2 sum = Vec2::Zero();
+    double count = 0.0;
+    for (const TracedArc& arc : loop.arcs) {
+      for (const Vec2& p : arc.points) sum += p;
+      count += static_cast<double>(arc.points.size());
+    }
+    middles.emplace_back(sum / count);
+  }
+  return middles;
+}
+
+bool Tracer::Probe(const std::vector<Vec2>& points, TracedSection* section,
+                   std::vector<SpacePose>* inside) {
+  const std::vector<SpacePose> known = *inside;
+  for (const Vec2& p : points) {
+    if (known.empty() || !IsInside(section->loops, p)) continue;
+    const auto nearest = std::ranges::min_element(
+        known, {}, [&](const SpacePose& pose) { return (pose.at.head<2>() - p).squaredNorm(); });
+    PlacedPose from, to;
+    VecX target = nearest->at;
+    target.head<2>() = p;
+    if (!space_.Place(*nearest, &from)) continue;
+    if (space_.Close(from, target, &to) && to.pose.margin.minCoeff() > 0.0) {
+      inside->push_back(to.pose);
+      continue;
+    }
+    const auto hit = Walk(from, p - Vec2(from.pose.at.head<2>()));
+    if (!hit || Knows(section->loops, *hit)) continue;
+    trouble_.clear();
+    TracedLoop loop = Trace(*hit);
+    if (!loop.closed) return false;
+    section->area += loop.area;
+    section->error += loop.error;
+    section->loops.push_back(std::move(loop));
+  }
+  return true;
+}
+
 bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* section,
                       std::vector<SpacePose>* inside) {
   const bool is_flat = !std::isfinite(section->height);
@@ -601,8 +686,12 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
 class SolidTracer {
  public:
   SolidTracer(const PoseSpace& space, const PlacedPose& home,
-              const std::function<void(double)>& progress, double share)
-      : solid_(space), flat_(space.Section(2)), progress_(progress), share_(share) {
+              const std::function<void(double)>& progress, double share, int threads)
+      : solid_(space),
+        flat_(space.Section(2)),
+        progress_(progress),
+        share_(share),
+        threads_(threads) {
     seeds_.emplace(home.pose.at[2], std::vector<SpacePose>{home.pose});
   }
 
@@ -615,6 +704,8 @@ class SolidTracer {
       set.summary.message = Trouble();
       return set;
     }
+    (void)Rule(set.low, set.high);
+    while (Widen(&set)) Prepare({{set.low, set.high}});
     Integrate(&set);
     if (!lost_.empty()) {
       set.summary.stop = Stop::kNoConvergence;
@@ -626,15 +717,13 @@ class SolidTracer {
     for (const auto& [height, poses] : seeds_) {
       if (!poses.empty()) set.inside.push_back(poses.back());
     }
-    set.closings = flat_.space().closings() + solid_.space().closings();
+    set.closings = closings_ + solid_.space().closings();
     return set;
   }
-  [[nodiscard]] bool unbounded() const { return solid_.unbounded() || flat_.unbounded(); }
+  [[nodiscard]] bool unbounded() const { return solid_.unbounded() || unbounded_; }
 
  private:
-  [[nodiscard]] std::string Trouble() const {
-    return !flat_.trouble().empty() ? flat_.trouble() : solid_.trouble();
-  }
+  [[nodiscard]] std::string Trouble() const { return !lost_.empty() ? lost_ : solid_.trouble(); }
 
   // Up (or down) to the last section that there is.
   double Climb(const PlacedPose& home, double sign) {
@@ -649,7 +738,7 @@ class SolidTracer {
       best = hit->at.pose.at[2];
       first = std::max(first, gain);
       if (i > 0 && gain < 1e-7 * first) break;
-      // A little below, where there is room, from the middle of the section.
+      // A little below, where there is room, from the pose that gets highest.
       const double below = best - sign * std::max(1e-3 * gain, 1e-9 * first);
       PlacedPose low;
       VecX target = at.pose.at;
@@ -657,66 +746,197 @@ class SolidTracer {
       if (!solid_.space().Close(at, target, &low) || low.pose.margin.minCoeff() < 0.0) break;
       seeds_[below].push_back(low.pose);
       (void)AreaAt(below);
-      const auto& found = seeds_[below];
-      const SpacePose* middle = &low.pose;
-      double room = -1.0;
-      for (const SpacePose& pose : found) {
-        // The widest margin, each by how much it has at home.
-        double least = std::numeric_limits<double>::infinity();
-        for (Eigen::Index j = 0; j < pose.margin.size(); ++j) {
-          least = std::min(least, pose.margin[j] / std::max(home.pose.margin[j], 1e-12));
-        }
-        if (least > room) {
-          room = least;
-          middle = &pose;
-        }
+      at = low;
+      double highest = -std::numeric_limits<double>::infinity();
+      for (const SpacePose& pose : seeds_[below]) {
+        PlacedPose from;
+        if (!solid_.space().Place(pose, &from)) continue;
+        const auto top = solid_.Walk(from, up);
+        if (!top || sign * top->at.pose.at[2] <= highest) continue;
+        highest = sign * top->at.pose.at[2];
+        at = from;
       }
-      if (!solid_.space().Place(*middle, &at)) break;
     }
     return best;
   }
 
-  double AreaAt(double height) {
-    if (const auto known = sections_.find(height); known != sections_.end()) {
-      return known->second.area;
+  // Up and down from all poses that are known: other parts may reach farther.
+  bool Widen(TracedSet* set) {
+    bool wider = false;
+    for (const double sign : {-1.0, 1.0}) {
+      double& end = sign < 0.0 ? set->low : set->high;
+      PlacedPose best;
+      double farthest = end + sign * kTip * (set->high - set->low);
+      for (const auto& [height, poses] : seeds_) {
+        for (const SpacePose& pose : poses) {
+          PlacedPose from;
+          if (!solid_.space().Place(pose, &from)) continue;
+          const VecX up = sign * solid_.space().UnitOf(2) * VecX::Unit(3, 2);
+          const auto top = solid_.Walk(from, up);
+          if (!top || sign * (top->at.pose.at[2] - farthest) <= 0.0) continue;
+          farthest = top->at.pose.at[2];
+          best = from;
+        }
+      }
+      if (best.N.size() == 0) continue;
+      const double other = Climb(best, sign);
+      if (std::isfinite(other) && sign * (other - end) > 0.0) {
+        end = other;
+        wider = true;
+      }
     }
-    TracedSection section;
-    section.height = height;
-    flat_.space().Hold(2, height);
-    // From the nearest poses first.
-    std::vector<std::pair<double, const SpacePose*>> near;
-    for (const auto& [z, poses] : seeds_) {
-      for (const SpacePose& pose : poses) near.emplace_back(std::abs(z - height), &pose);
-    }
-    std::ranges::stable_sort(near, {}, [](const auto& pair) { return pair.first; });
+    return wider;
+  }
+
+  // Poses of the nearest sections on both sides, carried over to a height.
+  [[nodiscard]] std::vector<PlacedPose> SeedsAt(double height, const PoseSpace& flat) const {
     std::vector<PlacedPose> seeds;
-    for (size_t k = 0; k < near.size() && (k < 8 || (seeds.empty() && k < 200)); ++k) {
-      PlacedPose from, to;
-      if (!flat_.space().Place(*near[k].second, &from)) continue;
-      VecX target = from.pose.at;
-      target[2] = height;
-      if (!flat_.space().Close(from, target, &to) || to.pose.margin.minCoeff() <= 0.0) continue;
-      seeds.push_back(std::move(to));
+    const auto offer = [&](const std::vector<SpacePose>& poses) {
+      for (const SpacePose& pose : poses) {
+        PlacedPose from, to;
+        VecX target = pose.at;
+        target[2] = height;
+        if (flat.Place(pose, &from) && flat.Close(from, target, &to) &&
+            to.pose.margin.minCoeff() > 0.0) {
+          seeds.push_back(std::move(to));
+        }
+      }
+    };
+    auto above = seeds_.lower_bound(height), below = above;
+    for (size_t k = 0; above != seeds_.end() && (k < kNearSections || seeds.empty()); ++k) {
+      offer((above++)->second);
     }
+    const size_t found = seeds.size();
+    for (size_t k = 0; below != seeds_.begin() && (k < kNearSections || seeds.size() == found);
+         ++k) {
+      offer((--below)->second);
+    }
+    return seeds;
+  }
+
+  struct Found {
+    TracedSection section;
     std::vector<SpacePose> inside;
-    if (!seeds.empty() && !flat_.TraceAll(seeds, &section, &inside) && lost_.empty()) {
-      lost_ = fmt::format("section at {:.6g}: {}", height, flat_.trouble());
+    std::string lost;
+    bool unbounded = false;
+    long closings = 0;
+  };
+  // Traces what a section does not have yet around these poses.
+  static void Extend(Tracer* tracer, const std::vector<PlacedPose>& seeds,
+                     const std::vector<Vec2>& holes, Found* found) {
+    if (!seeds.empty() || !holes.empty()) {
+      const bool traced =
+          (seeds.empty() || tracer->TraceAll(seeds, &found->section, &found->inside)) &&
+          tracer->Probe(holes, &found->section, &found->inside);
+      if (!traced && found->lost.empty()) {
+        found->lost =
+            fmt::format("section at {:.6g}: {}", found->section.height, tracer->trouble());
+      }
+      found->unbounded = tracer->unbounded();
     }
-    auto& list = seeds_[height];
-    list.insert(list.end(), inside.begin(), inside.end());
-    const double area = section.area;
-    sections_.emplace(height, std::move(section));
-    return area;
+  }
+  static void Append(const std::vector<Vec2>& more, std::vector<Vec2>* points) {
+    points->insert(points->end(), more.begin(), more.end());
+  }
+  [[nodiscard]] Found TraceAt(double height) const {
+    Tracer tracer = flat_;
+    const long before = tracer.space().closings();
+    tracer.space().Hold(2, height);
+    Found found;
+    found.section.height = height;
+    Extend(&tracer, SeedsAt(height, tracer.space()), {}, &found);
+    std::vector<Vec2> points = PointsIn(found.section);
+    const auto above = sections_.lower_bound(height);
+    if (above != sections_.end()) Append(MiddlesOfHoles(above->second), &points);
+    if (above != sections_.begin()) Append(MiddlesOfHoles(std::prev(above)->second), &points);
+    Extend(&tracer, {}, points, &found);
+    found.closings = tracer.space().closings() - before;
+    return found;
+  }
+  void Keep(Found found) {
+    const double height = found.section.height;
+    closings_ += found.closings;
+    if (lost_.empty()) lost_ = found.lost;
+    unbounded_ = unbounded_ || found.unbounded;
+    auto& poses = seeds_[height];
+    poses.insert(poses.end(), found.inside.begin(), found.inside.end());
+    sections_[height] = std::move(found.section);
+    // What is near and has no such part has it now.
+    std::vector<double> changed = {height};
+    while (!changed.empty()) {
+      const auto at = sections_.find(changed.back());
+      changed.pop_back();
+      for (const bool up : {false, true}) {
+        if (up ? std::next(at) == sections_.end() : at == sections_.begin()) continue;
+        const auto other = up ? std::next(at) : std::prev(at);
+        Tracer tracer = flat_;
+        const long before = tracer.space().closings();
+        tracer.space().Hold(2, other->first);
+        std::vector<PlacedPose> seeds;
+        for (const SpacePose& pose : seeds_[at->first]) {
+          PlacedPose from, to;
+          VecX target = pose.at;
+          target[2] = other->first;
+          if (tracer.space().Place(pose, &from) && tracer.space().Close(from, target, &to) &&
+              to.pose.margin.minCoeff() > 0.0 &&
+              !IsInside(other->second.loops, to.pose.at.head<2>())) {
+            seeds.push_back(std::move(to));
+          }
+        }
+        Found more;
+        more.section = other->second;
+        more.inside = seeds_[other->first];
+        Extend(&tracer, seeds, MiddlesOfHoles(at->second), &more);
+        if (lost_.empty()) lost_ = more.lost;
+        if (more.section.loops.size() > other->second.loops.size()) {
+          other->second = std::move(more.section);
+          seeds_[other->first] = std::move(more.inside);
+          changed.push_back(other->first);
+          mended_ = true;
+        }
+        closings_ += tracer.space().closings() - before;
+      }
+    }
+  }
+
+  double AreaAt(double height) {
+    if (!sections_.contains(height)) Keep(TraceAt(height));
+    return sections_.at(height).area;
+  }
+  // All of the nodes between these ends at once, from what is known before.
+  void Prepare(const std::vector<std::pair<double, double>>& ends) {
+    std::vector<double> heights;
+    for (const auto& [a, b] : ends) {
+      for (size_t k = 0; k < Kronrod::abscissa().size(); ++k) {
+        for (const double sign : {-1.0, 1.0}) {
+          if (k == 0 && sign > 0.0) continue;
+          heights.push_back(NodeOf(a, b, k, sign));
+        }
+      }
+    }
+    std::vector<Found> found(heights.size());
+    std::atomic<size_t> next = 0;
+    const auto run = [&] {
+      for (size_t i = next++; i < heights.size(); i = next++) found[i] = TraceAt(heights[i]);
+    };
+    std::vector<std::thread> others;
+    for (int t = 1; t < threads_; ++t) others.emplace_back(run);
+    run();
+    for (std::thread& other : others) other.join();
+    for (Found& one : found) Keep(std::move(one));
   }
 
   // Gauss–Kronrod 7, 15, its error as QUADPACK has it [Piessens et al. 1983].
+  using Kronrod = boost::math::quadrature::gauss_kronrod<double, 15>;
+  [[nodiscard]] static double NodeOf(double a, double b, size_t k, double sign) {
+    return 0.5 * (a + b) + sign * 0.5 * (b - a) * Kronrod::abscissa()[k];
+  }
   struct Part {
     double a, b, value, error;
   };
   Part Rule(double a, double b) {
-    using Kronrod = boost::math::quadrature::gauss_kronrod<double, 15>;
     using Gauss = boost::math::quadrature::gauss<double, 7>;
-    const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
+    const double half = 0.5 * (b - a);
     double kronrod = 0.0, gauss = 0.0, spread = 0.0;
     std::vector<std::pair<double, double>> values;
     // From the middle on; every other node is Gauss's.
@@ -724,7 +944,7 @@ class SolidTracer {
       const double weight = Kronrod::weights()[k];
       for (const double sign : {-1.0, 1.0}) {
         if (k == 0 && sign > 0.0) continue;
-        const double y = AreaAt(middle + sign * half * Kronrod::abscissa()[k]);
+        const double y = AreaAt(NodeOf(a, b, k, sign));
         values.emplace_back(weight, y);
         kronrod += weight * y;
         if (k % 2 == 0) gauss += Gauss::weights()[k / 2] * y;
@@ -738,6 +958,7 @@ class SolidTracer {
 
   void Integrate(TracedSet* set) {
     std::vector<Part> parts = {Rule(set->low, set->high)};
+    if (std::exchange(mended_, false)) parts = {Rule(set->low, set->high)};
     const auto sum = [&](double Part::*member) {
       double total = 0.0;
       for (const Part& part : parts) total += part.*member;
@@ -745,15 +966,20 @@ class SolidTracer {
     };
     const double start = sum(&Part::error);
     while (sum(&Part::error) > share_ * sum(&Part::value) && sections_.size() < kMostSections &&
-           lost_.empty()) {
+           closings_ < kEnoughClosings && lost_.empty()) {
       const auto worst = std::ranges::max_element(parts, {}, &Part::error);
       const double a = worst->a, b = worst->b, middle = 0.5 * (a + b);
+      Prepare({{a, middle}, {middle, b}});
       *worst = Rule(a, middle);
       parts.push_back(Rule(middle, b));
+      if (std::exchange(mended_, false)) {
+        for (Part& part : parts) part = Rule(part.a, part.b);
+      }
       if (progress_ && start > 0.0) {
         const double done = std::log(start / std::max(sum(&Part::error), 1e-300)) /
                             std::log(start / (share_ * sum(&Part::value)));
-        progress_(std::clamp(done, 0.0, 1.0));
+        const double enough = static_cast<double>(closings_) / kEnoughClosings;
+        progress_(std::clamp(std::max(done, enough), 0.0, 1.0));
       }
     }
     set->measure = sum(&Part::value);
@@ -766,9 +992,12 @@ class SolidTracer {
   Tracer solid_, flat_;
   std::function<void(double)> progress_;
   const double share_;
+  const int threads_;
   std::map<double, std::vector<SpacePose>> seeds_;
   std::map<double, TracedSection> sections_;
   std::string lost_;
+  long closings_ = 0;
+  bool mended_ = false, unbounded_ = false;
 };
 
 }  // namespace
@@ -824,11 +1053,12 @@ TracedSet TraceLine(const PoseSpace& space, const PlacedPose& home) {
   return set;
 }
 
-TracedSet TraceArea(const PoseSpace& space, const PlacedPose& home) {
+TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds) {
   TracedSet set;
   Tracer tracer(space);
   TracedSection section;
-  const bool found = tracer.TraceAll({home}, &section, &set.inside);
+  const bool found = tracer.TraceAll(seeds, &section, &set.inside) &&
+                     tracer.Probe(PointsIn(section), &section, &set.inside);
   if (tracer.unbounded()) return Unbounded(set);
   set.closings = tracer.space().closings();
   if (!found) {
@@ -845,16 +1075,52 @@ TracedSet TraceArea(const PoseSpace& space, const PlacedPose& home) {
 
 }  // namespace
 
+TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside) {
+  return space.over() == 1 ? TraceLine(space, inside.front()) : TraceArea(space, inside);
+}
+
+TracedArc Resampled(const TracedArc& arc, int finer) {
+  TracedArc fine{arc.bound, {}};
+  if (arc.points.empty()) return fine;
+  // Barycentric weights of Chebyshev–Lobatto nodes.
+  const auto& node = Nodes().node;
+  Eigen::MatrixXd weight(kDegree * finer, kDegree + 1);
+  for (int i = 0; i < kDegree * finer; ++i) {
+    const double s = 0.5 * (1.0 - std::cos(pi * (i + 1) / (kDegree * finer)));
+    for (int k = 0; k <= kDegree; ++k) {
+      const double w = (k % 2 == 0 ? 1.0 : -1.0) * (k == 0 || k == kDegree ? 0.5 : 1.0);
+      const double off = s - node.at(static_cast<size_t>(k));
+      if (std::abs(off) < 1e-14) {
+        weight.row(i).setZero();
+        weight(i, k) = 1.0;
+        break;
+      }
+      weight(i, k) = w / off;
+    }
+    weight.row(i) /= weight.row(i).sum();
+  }
+  fine.points.push_back(arc.points[0]);
+  for (size_t first = 0; first + kDegree < arc.points.size(); first += kDegree) {
+    Eigen::Matrix<double, kDegree + 1, 2> x;
+    for (size_t k = 0; k <= kDegree; ++k) {
+      x.row(static_cast<Eigen::Index>(k)) = arc.points[first + k].transpose();
+    }
+    const Eigen::MatrixXd y = weight * x;
+    for (Eigen::Index i = 0; i < y.rows(); ++i) fine.points.emplace_back(y.row(i).transpose());
+  }
+  return fine;
+}
+
 TracedSet TraceSet(const PoseSpace& space, const PlacedPose& home,
-                   const std::function<void(double)>& progress, double share) {
+                   const std::function<void(double)>& progress, double share, int threads) {
   const auto start = std::chrono::steady_clock::now();
   TracedSet set;
   if (space.over() == 1) {
     set = TraceLine(space, home);
   } else if (space.over() == 2) {
-    set = TraceArea(space, home);
+    set = TraceArea(space, {home});
   } else {
-    SolidTracer tracer(space, home, progress, share);
+    SolidTracer tracer(space, home, progress, share, threads);
     set = tracer.Trace(home);
     if (tracer.unbounded()) set = Unbounded(std::move(set));
   }

@@ -46,10 +46,16 @@ struct TracedSet {
   double wall_s = 0.0;
 };
 
-/// From a home pose inside all bounds; volumes until their error is this share of them.
+/// From a home pose inside all bounds; volumes until their error is this share of them, or a
+/// million poses are closed. Nothing depends on the number of threads.
 [[nodiscard]] TracedSet TraceSet(const PoseSpace& space, const PlacedPose& home,
                                  const std::function<void(double)>& progress = {},
-                                 double share = 1e-8);
+                                 double share = 1e-8, int threads = 1);
+
+/// Of one or two dimensions, from several poses inside.
+[[nodiscard]] TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside);
+/// The curve with `finer` points for each of its own, by its polynomials.
+[[nodiscard]] TracedArc Resampled(const TracedArc& arc, int finer);
 
 /// Curves of two dimensions on which the margin of a bound vanishes, within all the others: from
 /// pairs of poses on both sides of it, the first one where it is positive.

@@ -244,6 +244,10 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
        "one to three coordinates that are free: x,y,z,roll,pitch,yaw of the output, drives, "
        "joints; x_mm=-100:100 within a box (repeatable)");
   list("--at", &asked.at, "NAME=VALUE (NAME_mm, NAME_deg): held there; others stay at home");
+  list("--for-all", &asked.for_all,
+       "NAME=LOW:HIGH: places reached with all values of the range (total orientation)");
+  list("--for-some", &asked.for_some,
+       "NAME=LOW:HIGH: places reached with some of them (inclusion orientation)");
   list("--from", &asked.from, "NAME=VALUE: a pose of the set, where home is none");
   list("--range", &asked.ranges, "NAME=LOW:HIGH of a drive or joint, instead of the model's");
   list("--cone", &asked.cones,

@@ -334,6 +334,45 @@ class Commands(unittest.TestCase):
         with self.assertRaises(mbverify.InputError):
             mbverify.study(study, count=-1)
 
+    def test_a_workspace_is_the_programs(self):
+        result = mbverify.workspace(
+            "rubbing_five_bar", {"x_mm": (-200, 200), "y_mm": (150, 500)}, resolution=40, jobs=2
+        )
+        self.assertTrue(result.agrees)
+        self.assertEqual(result.coordinates, ["tool.x", "tool.y"])
+        value, error = result.measure
+        # A mean over the lattice's poses, as the program has it; the area by its boundary's nodes.
+        cells, condition = result.cells, result.quality["condition"]
+        inside = cells["inside"] == 1
+        self.assertAlmostEqual(np.nanmean(cells["condition"][inside]), condition["mean"], delta=1e-6)
+        self.assertNotAlmostEqual(
+            np.nanmean(1.001 * cells["condition"][inside]), condition["mean"], delta=1e-6
+        )
+        x, y = result.boundary["tool.x_m"], result.boundary["tool.y_m"]
+        self.assertAlmostEqual(x.max(), 0.2, delta=1e-11)
+        self.assertIn("box tool.x = 0.2", result.boundary["bound"])
+        area = 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+        self.assertAlmostEqual(area, value, delta=5e-3 * value)
+        self.assertLess(error, 1e-6 * value)
+        some = mbverify.workspace("spr_tripod", ["x"], at={"y": 0}, for_some={"z_mm": (560, 580)})
+        self.assertGreater(some.measure[0], 0.1)
+        with self.assertRaises(mbverify.InputError):
+            mbverify.workspace("four_bar", ["x", "qq"])
+
+    def test_a_workspaces_surface_is_closed(self):
+        result = mbverify.workspace(
+            "spr_tripod",
+            {"x_mm": (-20, 20), "y_mm": (-20, 20), "z_mm": (560, 600)},
+            resolution=12,
+        )
+        vertices, triangles = result.surface
+        a, b, c = (vertices[triangles[:, k]] for k in range(3))
+        volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+        flooded = result.summary["set"]["flooded"]
+        self.assertAlmostEqual(volume, flooded["value"], delta=1e-6 * 6.4e-5)
+        self.assertAlmostEqual(volume, 6.4e-5, delta=flooded["error"])
+        self.assertLess(flooded["error"], 0.1 * 6.4e-5)
+
     def test_a_wrong_number_is_a_verdict(self):
         result = mbverify.run("four_bar/static", set={"simulation.parameters": "{rho: 2.1}"})
         self.assertEqual(result.verdict, "disagree")

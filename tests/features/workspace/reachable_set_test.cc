@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 #include <filesystem>
@@ -343,6 +344,48 @@ TEST(ReachableSet, TheTripodsVolumeIsThatOfItsClosedForm) {
   EXPECT_NEAR(set.high, 0.708854710, 1e-6);
 }
 
+// A box of 0.6 × 0.2 × 0.4 m less a ball of 0.25 m about the middle of its floor: below, sections
+// have two parts, which meet above, and near the ball's top a hole.
+TEST(ReachableSet, AVolumeWithSectionsOfTwoPartsIsThatByHand) {
+  const auto gantry = [](double radius) {
+    return FromText(fmt::format(R"(
+name: gantry
+bodies:
+  bridge: {{mass: 1, inertia: [1, 1, 1]}}
+  trolley: {{mass: 1, inertia: [1, 1, 1]}}
+  tool: {{mass: 1, inertia: [1, 1, 1]}}
+world: {{frames: {{floor: [0, 0, -0.2]}}}}
+joints:
+  x: {{kind: prismatic, parent: world, child: bridge, axis: x, guess: 0.02, range: [-0.3, 0.3]}}
+  y: {{kind: prismatic, parent: bridge, child: trolley, axis: y, guess: 0.01, range: [-0.1, 0.1]}}
+  z: {{kind: prismatic, parent: trolley, child: tool, axis: z, guess: 0.15, range: [-0.2, 0.2]}}
+drives:
+  x: {{kind: joint, joint: x}}
+  y: {{kind: joint, joint: y}}
+  z: {{kind: joint, joint: z}}
+  strut: {{kind: distance, from: world.floor, to: tool, range: [{}, 2]}}
+outputs: {{tool: tool}}
+)",
+                                radius));
+  };
+  const auto volume = [](double r) { return 0.048 - pi / 2 * (0.2 * r * r - 0.002 / 3); };
+  SetArguments arguments = Over({"x", "y", "z"}, 32);
+  arguments.flood.threads = 2;
+  const Answer answer = Ask(gantry(0.25), arguments);
+  ExpectMeasure(answer, volume(0.25), 1e-9);
+  EXPECT_NEAR(answer.set.traced.low, -0.2, 1e-9);
+  // A ball of 1e-4 m more shows.
+  EXPECT_GT(volume(0.25) - volume(0.2501), 1e3 * answer.set.traced.error);
+  PoseSpace space(answer.question->mechanism, answer.question->settings);
+  PlacedPose home;
+  ASSERT_TRUE(space.Home(&home));
+  space.CountFrom(&home);
+  const TracedSet one = TraceSet(space, home, {}, 1e-5, 1);
+  const TracedSet many = TraceSet(space, home, {}, 1e-5, 3);
+  EXPECT_EQ(one.measure, many.measure);
+  EXPECT_EQ(one.closings, many.closings);
+}
+
 // What the closed form takes for reachable ends where the traced boundary lies, to 1e-8 m.
 TEST(ReachableSet, ASectionOfTheScaraRobotIsThatOfItsClosedForm) {
   const Mechanism robot = ShippedModel("scara_robot");
@@ -564,6 +607,131 @@ TEST(Quality, AnArmsLowestFrequencyIsThatByHand) {
     const double half = 0.5 * A.trace();
     const double lowest = half - std::sqrt(half * half - A.determinant());
     EXPECT_NEAR(map.values[k][at - map.indices.begin()], std::sqrt(lowest) / (2 * pi), 1e-6);
+  }
+}
+
+// W K⁻¹ Wᵀ of the same arm.
+TEST(Quality, AnArmsStiffnessIsThatByHand) {
+  Mechanism arm = FromText(Arm());
+  arm.drives[0].stiffness = 900;
+  arm.drives[1].stiffness = 400;
+  const Answer answer = Ask(arm, Over({"x", "y"}, 40));
+  const QualityMap map = MapQuality(*answer.question, answer.set, "tip", 1);
+  const auto at = std::ranges::find(map.indices, "stiffness_least", &QualityIndex::name);
+  ASSERT_NE(at, map.indices.end());
+  for (size_t k = 0; k < map.points.size(); k += 11) {
+    const Vec3& p = answer.set.flooded.lattice[map.points[k]].at;
+    const double c2 = (p.squaredNorm() - 0.29) / 0.2;
+    const double q1 =
+        std::atan2(p[1], p[0]) - std::atan2(0.2 * std::sqrt(1 - c2 * c2), 0.5 + 0.2 * c2);
+    Eigen::Matrix2d J;
+    J << -p[1], -0.2 * std::sin(q1 + std::acos(c2)), p[0], 0.2 * std::cos(q1 + std::acos(c2));
+    const Eigen::Matrix2d C =
+        J * Eigen::Vector2d(1.0 / 900, 1.0 / 400).asDiagonal() * J.transpose();
+    const double half = 0.5 * C.trace();
+    const double soft = half + std::sqrt(half * half - C.determinant());
+    EXPECT_NEAR(map.values[k][at - map.indices.begin()] * soft, 1.0, 1e-6);
+    EXPECT_NEAR(map.values[k][1 + at - map.indices.begin()] * (C.determinant() / soft), 1.0, 1e-5);
+  }
+}
+
+// A table on two slides, with a strut from its corner as a third drive: all is known by the strut's
+// direction u. Rates D = (1, 0), (0, 1), u; the table's twist is the slides'.
+TEST(Quality, RedundantDrivesIndicesAreThoseByHand) {
+  Mechanism table = FromText(R"(
+name: table
+gravity: [0, -9.81, 0]
+bodies:
+  bridge: {mass: 3, inertia: [0.01, 0.01, 0.01]}
+  table: {mass: 2, inertia: [0.01, 0.01, 0.01]}
+world: {frames: {corner: [-0.5, -0.4, 0]}}
+joints:
+  x: {kind: prismatic, parent: world, child: bridge, axis: x, range: [-0.2, 0.2]}
+  y: {kind: prismatic, parent: bridge, child: table, axis: y, range: [-0.2, 0.2]}
+drives:
+  x: {kind: joint, joint: x}
+  y: {kind: joint, joint: y}
+  strut: {kind: distance, from: world.corner, to: table}
+motors:
+  x: {continuous: 40, max_speed: 3}
+  y: {continuous: 30, max_speed: 2}
+  strut: {continuous: 25, max_speed: 1.5}
+outputs: {table: table}
+)");
+  const std::array<double, 3> servo = {9000, 4000, 6000};
+  for (size_t d = 0; d < 3; ++d) table.drives[d].stiffness = servo.at(d);
+  const Answer answer = Ask(table, Over({"x", "y"}, 40));
+  ASSERT_TRUE(answer.set.agree) << answer.diagnostics.Text() << answer.set.verdict;
+  EXPECT_NEAR(answer.set.traced.measure, 0.16, 1e-9);
+  const QualityMap map = MapQuality(*answer.question, answer.set, "table", 1);
+  ASSERT_EQ(map.why_none, "");
+  ASSERT_GT(map.points.size(), 50u);
+  const Eigen::Vector3d force(40, 30, 25), speed(3, 2, 1.5);
+  for (size_t k = 0; k < map.points.size(); k += 5) {
+    const Vec3& p = answer.set.flooded.lattice[map.points[k]].at;
+    const Eigen::Vector2d arm(p[0] + 0.5, p[1] + 0.4), u = arm.normalized();
+    Eigen::Matrix<double, 3, 2> D;
+    D << 1, 0, 0, 1, u[0], u[1];
+    const auto value = [&](const std::string& name) {
+      const auto at = std::ranges::find(map.indices, name, &QualityIndex::name);
+      EXPECT_NE(at, map.indices.end()) << name;
+      return map.values[k][at - map.indices.begin()];
+    };
+    // DᵀD = 1 + u uᵀ: its eigenvalues are 2 and 1.
+    EXPECT_NEAR(value("condition"), std::sqrt(2.0), 1e-9);
+    EXPECT_NEAR(value("manipulability"), 1 / std::sqrt(2.0), 1e-9);
+    EXPECT_NEAR(value("type2_distance"), 1.0, 1e-9);
+    // All directions by brute force: what the drives allow, and what they hold.
+    double slow = 1e9, fast = 0.0, weak = 1e9, strong = 0.0;
+    constexpr int n = 3600;
+    for (int i = 0; i < n; ++i) {
+      const Eigen::Vector2d d(std::cos(2 * pi * i / n), std::sin(2 * pi * i / n));
+      const double v = (speed.array() / (D * d).array().abs()).minCoeff();
+      slow = std::min(slow, v);
+      fast = std::max(fast, v);
+      // f d = τ_1 e_1 + τ_2 e_2 + τ_3 u: the most of f over τ_3 by halving its slope.
+      const auto most = [&](double strut) {
+        double f = 1e9, low = -1e9;
+        for (int c = 0; c < 2; ++c) {
+          if (std::abs(d[c]) < 1e-12) continue;
+          const double a = (strut * u[c] - force[c]) / d[c], b = (strut * u[c] + force[c]) / d[c];
+          f = std::min(f, std::max(a, b));
+          low = std::max(low, std::min(a, b));
+        }
+        return f >= low ? f : -1.0;
+      };
+      double f = 0.0;
+      for (int s = 0; s <= 200; ++s) f = std::max(f, most(25.0 * (s / 100.0 - 1.0)));
+      weak = std::min(weak, f);
+      strong = std::max(strong, f);
+    }
+    EXPECT_NEAR(value("speed_least"), slow, 1e-5);
+    EXPECT_NEAR(value("speed_most"), fast, 5e-3);
+    EXPECT_NEAR(value("force_least"), weak, 5e-3 * weak);
+    EXPECT_NEAR(value("force_most"), strong, 5e-3 * strong);
+    // Payload: (0, 9.81 (2 + m)) = (τ_1, τ_2) + τ_3 u; the strut's sign is that of lifting.
+    double payload = 0.0;
+    for (int s = 0; s <= 2000; ++s) {
+      const double strut = 25.0 * s / 2000;
+      if (strut * u[0] > 40) continue;
+      payload = std::max(payload, (30 + strut * u[1]) / 9.81 - 2);
+    }
+    EXPECT_NEAR(value("payload"), payload, 1e-3);
+    // Servos, and what the held strut (least norm) adds across u.
+    const Eigen::Vector2d weight(0, 9.81 * 2);
+    const double strut = (D * (D.transpose() * D).inverse() * weight)[2];
+    Eigen::Matrix2d K = Eigen::Vector2d(9000, 4000).asDiagonal();
+    K += 6000 * u * u.transpose() -
+         strut / arm.norm() * (Eigen::Matrix2d::Identity() - u * u.transpose());
+    const Eigen::Vector2d root = Eigen::Vector2d(5, 2).cwiseSqrt().cwiseInverse();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> modes(
+        Eigen::Matrix2d(root.asDiagonal() * K * root.asDiagonal())),
+        stiff(K);
+    EXPECT_NEAR(value("frequency"), std::sqrt(modes.eigenvalues()[0]) / (2 * pi), 1e-6);
+    EXPECT_NEAR(value("stiffness_least"), stiff.eigenvalues()[0], 1e-2);
+    EXPECT_NEAR(value("stiffness_most"), stiff.eigenvalues()[1], 1e-2);
+    // A servo of 1 % more would show.
+    EXPECT_GT(std::abs(1.01 * value("stiffness_least") - stiff.eigenvalues()[0]), 1.0);
   }
 }
 

@@ -75,6 +75,23 @@ TEST_F(WorkspaceCommand, WaysToCloseAndTypeTwoCurvesAreListed) {
   EXPECT_THAT(ReadAll(folder / "joint_space.csv"), HasSubstr("curve,motor1_rad,motor2_rad"));
 }
 
+TEST_F(WorkspaceCommand, ARangeOfOrientationsIsAskedForAllOrForSome) {
+  const std::string asked = "spr_tripod --over x --at y=0 --resolution 100 --json - ";
+  std::vector<double> lengths;
+  for (const char* range : {"--for-all z_mm=560:580", "--for-some z_mm=560:580"}) {
+    const ProgramResult result = Call(asked + range);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const auto set = nlohmann::json::parse(result.out)["set"];
+    lengths.push_back(set["traced"]["value"]);
+    const auto& ranged = set[lengths.size() == 1 ? "for_all" : "for_some"][0];
+    EXPECT_EQ(ranged["name"], "platform.z");
+    EXPECT_EQ(ranged["low"], 0.56);
+    EXPECT_THAT(result.err, HasSubstr(lengths.size() == 1 ? "for all platform.z 560 … 580 mm"
+                                                          : "for some platform.z"));
+  }
+  EXPECT_LT(lengths[0], lengths[1]);
+}
+
 TEST_F(WorkspaceCommand, BadInputIsRefusedWithExitCode2) {
   for (const auto& [arguments, message] : std::vector<std::pair<std::string, std::string>>{
            {"four_bar --over x,qq", "there is no coordinate 'qq'"},

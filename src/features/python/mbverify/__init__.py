@@ -6,8 +6,8 @@
     solver = mbverify.load("stewart").solver()        # the solver object, in the drives
     forces = solver.inverse_dynamics(solver.home)     # of this state
 
-SI units and radians. `run`, `audit`, `study` and `figures` start the program: their results are its
-files, and a file that ends the program ends no interpreter.
+SI units and radians. `run`, `audit`, `study`, `workspace` and `figures` start the program: their
+results are its files, and a file that ends the program ends no interpreter.
 """
 
 from ._native import (
@@ -26,7 +26,18 @@ from ._native import (
     Wrench,
     load,
 )
-from ._program import ProgramError, Result, StudyResult, audit, figures, program, run, study
+from ._program import (
+    ProgramError,
+    Result,
+    StudyResult,
+    WorkspaceResult,
+    audit,
+    figures,
+    program,
+    run,
+    study,
+    workspace,
+)
 
 __all__ = [
     "ConvergenceError",
@@ -44,6 +55,7 @@ __all__ = [
     "StudyResult",
     "UnreachableError",
     "UnsupportedError",
+    "WorkspaceResult",
     "Wrench",
     "audit",
     "figures",
@@ -51,6 +63,7 @@ __all__ = [
     "program",
     "run",
     "study",
+    "workspace",
 ]
 
 # `mbverify.load("stewart").solver()`

@@ -260,6 +260,146 @@ def study(file, *, count=None, seed=None, jobs=None, out=None, progress=False):
     return StudyResult(document, folder.path / document["study"], folder, text)
 
 
+class WorkspaceResult:
+    """What `mbverify workspace` says of a reachable set: `summary` is its JSON, `folder` has its
+    files. SI units and radians."""
+
+    def __init__(self, summary, folder, keep, text):
+        self.summary = summary
+        self.folder = folder
+        self.text = text
+        self._keep = keep
+
+    @property
+    def agrees(self):
+        """Whether all ways to the measure agree."""
+        return self.summary["agree"]
+
+    @property
+    def measure(self):
+        """Length, area or volume by the traced boundary, and its error."""
+        traced = self.summary["set"]["traced"]
+        return traced["value"], traced["error"]
+
+    @property
+    def coordinates(self):
+        """The names of the free ones."""
+        return [over["name"] for over in self.summary["set"]["over"]]
+
+    @property
+    def quality(self):
+        """Each index by name: unit, mean with its error, least and most and where."""
+        return {index["name"]: index for index in self.summary["set"]["quality"]}
+
+    @functools.cached_property
+    def boundary(self):
+        """Columns of reachable_boundary.csv: section, loop, arc, coordinates with their units,
+        bound and kind of what ends the set there (strings)."""
+        return _columns(self.folder / "reachable_boundary.csv")
+
+    @functools.cached_property
+    def cells(self):
+        """Columns of reachable_poses.csv, the corners of the lattice: coordinates with their units,
+        inside (0 or 1), bound, and each quality; NaN where it is not defined."""
+        return _columns(self.folder / "reachable_poses.csv")
+
+    @property
+    def surface(self):
+        """Of three coordinates: corners (n × 3) and triangles (m × 3) of the boundary."""
+        with open(self.folder / "reachable.ply", encoding="utf-8") as stream:
+            counts = []
+            for line in stream:
+                words = line.split()
+                if words[0] == "element":
+                    counts.append(int(words[2]))
+                if words[0] == "end_header":
+                    break
+            rows = [line.split() for line in stream]
+        vertices = numpy.array([row[:3] for row in rows[: counts[0]]], dtype=float)
+        triangles = numpy.array([row[1:4] for row in rows[counts[0] : sum(counts)]], dtype=int)
+        return vertices, triangles
+
+    def __repr__(self):
+        value, error = self.measure
+        how = "agree" if self.agrees else "disagree"
+        return f"<mbverify.WorkspaceResult {value:.6g} ± {error:.1g} {self.summary['set']['unit']}: {how}>"
+
+
+def _columns(file):
+    """A CSV file's columns by name: numbers as arrays, NaN where empty, else strings."""
+    with open(file, encoding="utf-8", newline="") as stream:
+        rows = list(csv.reader(stream))
+    columns = {}
+    for k, name in enumerate(rows[0]):
+        values = [row[k] for row in rows[1:]]
+        if name in ("bound", "kind"):
+            columns[name] = values
+        else:
+            columns[name] = numpy.array([float(value or "nan") for value in values])
+    return columns
+
+
+def workspace(
+    model,
+    over,
+    *,
+    at=None,
+    start=None,
+    ranges=None,
+    for_all=None,
+    for_some=None,
+    cones=None,
+    output=None,
+    resolution=None,
+    cross_singularities=False,
+    set=None,
+    jobs=None,
+    out=None,
+    progress=False,
+):
+    """Where a model reaches over one to three coordinates; its WorkspaceResult.
+
+    `over`: names, or {name: (low, high)} with a box (None: without). `at` and `start` (--from):
+    {name: value}. `ranges`, `for_all` and `for_some`: {name: (low, high)}; `cones`: {joint: angle}
+    [rad]. Names may end in _mm or _deg. Raises InputError for bad input.
+    """
+    folder = _Folder(out)
+    options = []
+    boxes = over if isinstance(over, dict) else {name: None for name in over}
+    for option, values in (
+        ("--over", boxes),
+        ("--at", at),
+        ("--from", start),
+        ("--range", ranges),
+        ("--for-all", for_all),
+        ("--for-some", for_some),
+        ("--cone", {f"{joint}_deg": numpy.degrees(angle) for joint, angle in (cones or {}).items()}),
+    ):
+        for name, value in (values or {}).items():
+            if value is not None:
+                ends = value if isinstance(value, (tuple, list)) else (value,)
+                name += "=" + ":".join(repr(float(end)) for end in ends)
+            options += [option, name]
+    for option, value in (("--output", output), ("--resolution", resolution), ("--jobs", jobs)):
+        if value is not None:
+            options += [option, value]
+    if cross_singularities:
+        options.append("--cross-singularities")
+    document, _, text = _call(
+        "workspace",
+        model,
+        *options,
+        *_set(set),
+        "--no-pictures",
+        "--out",
+        folder.path,
+        allowed=(0, 1),
+        progress=progress,
+    )
+    place = folder.path / document["mechanism"] / "workspace"
+    return WorkspaceResult(document, place, folder, text)
+
+
 def figures(
     scenario, *, out, formats=("pdf", "svg"), style=None, only=(), set=None, trust=False
 ):

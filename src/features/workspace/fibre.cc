@@ -1,0 +1,548 @@
+#include "features/workspace/fibre.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <thread>
+
+namespace mbv {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+constexpr double kFibreStride = 0.1;  // [rad, characteristic lengths]
+constexpr int kFewestNodes = 8;
+constexpr int kBestSteps = 3, kSamples = 64;  // towards where the least margin is largest
+constexpr int kFewestValues = 4;              // intervals of a range at first
+constexpr size_t kMostValues = 700;           // sections at most
+constexpr double kRests = 1e-5;               // a change by this share of the measure is enough
+constexpr int kLines = 4095,
+              kFiner = 16;  // scan lines, of three each the middle one; points for each node
+
+// Of the parabola through three points.
+struct Parabola {
+  double x1, y1, slope, bend;  // about the middle point: y1 + slope s + bend s²
+  Parabola(const std::array<double, 3>& x, const std::array<double, 3>& y)
+      : x1(x[1]), y1(y[1]), slope(0.0), bend(0.0) {
+    const double a = x[0] - x[1], b = x[2] - x[1];
+    const double da = (y[0] - y[1]) / a, db = (y[2] - y[1]) / b;
+    bend = (db - da) / (b - a);
+    slope = da - bend * a;
+  }
+  [[nodiscard]] double at(double x) const {
+    const double s = x - x1;
+    return y1 + s * (slope + bend * s);
+  }
+};
+
+}  // namespace
+
+struct Fibre::Node {
+  double value = 0.0;
+  PlacedPose at;
+};
+
+// The pose with another value of one of the ranged coordinates, and what lies behind it.
+Fibre::Reach Fibre::Go(const PoseSpace& space, const PlacedPose& from, size_t level, double value,
+                       PlacedPose* at) const {
+  PlacedPose next;
+  VecX target = from.pose.at;
+  target[settings_.ranged[level].coordinate] = value;
+  if (!space.Close(from, target, &next)) return Reach::kNone;
+  return Scan(space, next, level + 1, at);
+}
+
+Fibre::Reach Fibre::Scan(const PoseSpace& space, const PlacedPose& from, size_t level,
+                         PlacedPose* at) const {
+  if (level == settings_.ranged.size()) {
+    *at = from;
+    return Reach::kWhole;
+  }
+  const RangedCoordinate& ranged = settings_.ranged[level];
+  const double low = ranged.range.lower, high = ranged.range.upper;
+  const double start = std::clamp(from.pose.at[ranged.coordinate], low, high);
+  const double stride =
+      std::min(kFibreStride * space.UnitOf(ranged.coordinate), (high - low) / kFewestNodes);
+  std::vector<Node> nodes(1);
+  nodes[0].value = start;
+  Reach reach = Scan(space, from, level + 1, &nodes[0].at);
+  if (reach == Reach::kNone) return reach;
+  const PlacedPose first = nodes[0].at;
+  for (const double end : {low, high}) {
+    const int count = static_cast<int>(std::ceil(std::abs(end - start) / stride - 1e-9));
+    PlacedPose last = first;
+    for (int k = 1; k <= count; ++k) {
+      Node node{.value = start + (end - start) * k / count, .at = {}};
+      const Reach there = Go(space, last, level, node.value, &node.at);
+      if (there != Reach::kWhole) reach = Reach::kPart;
+      if (there == Reach::kNone) break;
+      last = node.at;
+      nodes.push_back(std::move(node));
+    }
+  }
+  std::ranges::sort(nodes, {}, &Node::value);
+  if (settings_.for_all) {
+    *at = first;
+    VecX least = at->pose.margin;
+    for (const Node& node : nodes) least = least.cwiseMin(node.at.pose.margin);
+    // Between nodes where a parabola falls below 0 or nearly so.
+    for (size_t k = 1; k + 1 < nodes.size() && reach == Reach::kWhole; ++k) {
+      const std::array<double, 3> x = {nodes[k - 1].value, nodes[k].value, nodes[k + 1].value};
+      for (Eigen::Index j = 0; j < least.size(); ++j) {
+        const std::array<double, 3> y = {nodes[k - 1].at.pose.margin[j], nodes[k].at.pose.margin[j],
+                                         nodes[k + 1].at.pose.margin[j]};
+        if (y[1] > y[0] || y[1] > y[2] || y[0] + y[2] == 2 * y[1]) continue;
+        const Parabola p(x, y);
+        const double bottom = x[1] - 0.5 * p.slope / p.bend, drop = y[1] - p.at(bottom);
+        if (!(p.bend > 0.0) || p.at(bottom) - 4 * drop > 0.0) continue;
+        PlacedPose there;
+        if (Go(space, nodes[k].at, level, bottom, &there) != Reach::kWhole) {
+          reach = Reach::kPart;
+          break;
+        }
+        least = least.cwiseMin(there.pose.margin);
+      }
+    }
+    at->pose.margin = least;
+    return reach;
+  }
+  // Towards the largest least margin.
+  const auto best = [&] {
+    return std::ranges::max_element(
+               nodes, {}, [](const Node& node) { return node.at.pose.margin.minCoeff(); }) -
+           nodes.begin();
+  };
+  for (int i = 0; i < kBestSteps && nodes.size() > 2; ++i) {
+    const auto middle = static_cast<size_t>(
+        std::clamp<std::ptrdiff_t>(best(), 1, static_cast<std::ptrdiff_t>(nodes.size()) - 2));
+    const std::array<double, 3> x = {nodes[middle - 1].value, nodes[middle].value,
+                                     nodes[middle + 1].value};
+    std::vector<Parabola> margins;
+    for (Eigen::Index j = 0; j < nodes[middle].at.pose.margin.size(); ++j) {
+      margins.emplace_back(x, std::array<double, 3>{nodes[middle - 1].at.pose.margin[j],
+                                                    nodes[middle].at.pose.margin[j],
+                                                    nodes[middle + 1].at.pose.margin[j]});
+    }
+    const auto least = [&](double s) {
+      double sum = std::numeric_limits<double>::infinity();
+      for (const Parabola& margin : margins) sum = std::min(sum, margin.at(s));
+      return sum;
+    };
+    double a = x[0], b = x[2], top = x[1];
+    for (int turn = 0; turn < 3; ++turn) {
+      for (int s = 1; s < kSamples; ++s) {
+        const double there = a + (b - a) * s / kSamples;
+        if (least(there) > least(top)) top = there;
+      }
+      const double width = (b - a) / kSamples;
+      a = std::max(x[0], top - width);
+      b = std::min(x[2], top + width);
+    }
+    if (std::abs(top - nodes[static_cast<size_t>(best())].value) < 1e-9 * (high - low)) break;
+    Node node{.value = top, .at = {}};
+    if (Go(space, nodes[middle].at, level, top, &node.at) == Reach::kNone) break;
+    nodes.insert(nodes.begin() + static_cast<std::ptrdiff_t>(middle + (top > x[1] ? 1 : 0)),
+                 std::move(node));
+  }
+  *at = nodes[static_cast<size_t>(best())].at;
+  return Reach::kWhole;
+}
+
+Fibre::Reach Fibre::At(const PoseSpace& space, const PlacedPose& from, const VecX& x,
+                       PlacedPose* at, double* at_start) const {
+  VecX target = from.pose.at;
+  target.head(x.size()) = x;
+  PlacedPose there;
+  *at_start = -1.0;
+  if (space.Close(from, target, &there)) {
+    *at_start = there.pose.margin.minCoeff();
+    return Scan(space, there, 0, at);
+  }
+  if (settings_.for_all) return Reach::kNone;
+  // At another value of the range it may be open.
+  const RangedCoordinate& ranged = settings_.ranged[0];
+  for (int k = 0; k <= kFewestNodes; ++k) {
+    VecX aside = from.pose.at;
+    aside[ranged.coordinate] =
+        ranged.range.lower + (ranged.range.upper - ranged.range.lower) * k / kFewestNodes;
+    PlacedPose other;
+    if (!space.Close(from, aside, &other)) continue;
+    target[ranged.coordinate] = aside[ranged.coordinate];
+    if (space.Close(other, target, &there)) return Scan(space, there, 0, at);
+  }
+  return Reach::kNone;
+}
+
+namespace {
+
+using ValueKey = std::array<int, 3>;  // of the finest grid of the range
+using Spans = std::vector<std::pair<double, double>>;
+
+Spans Combined(const Spans& a, const Spans& b, bool intersect) {
+  Spans result;
+  if (intersect) {
+    for (const auto& [al, ah] : a) {
+      for (const auto& [bl, bh] : b) {
+        if (std::max(al, bl) < std::min(ah, bh)) {
+          result.emplace_back(std::max(al, bl), std::min(ah, bh));
+        }
+      }
+    }
+    return result;
+  }
+  Spans all = a;
+  all.insert(all.end(), b.begin(), b.end());
+  std::ranges::sort(all);
+  for (const auto& [low, high] : all) {
+    if (result.empty() || low > result.back().second) {
+      result.emplace_back(low, high);
+    } else {
+      result.back().second = std::max(result.back().second, high);
+    }
+  }
+  return result;
+}
+
+bool Contains(const Spans& spans, double x) {
+  return std::ranges::any_of(spans,
+                             [&](const auto& span) { return x >= span.first && x <= span.second; });
+}
+
+// The boundary at values of the range, and what they have in common, or together.
+class RangeTracer {
+ public:
+  RangeTracer(const PoseSpace& space, const PlacedPose& start, int threads,
+              const std::function<void(double)>& progress)
+      : space_(space),
+        settings_(space.settings()),
+        start_(start),
+        threads_(threads),
+        progress_(progress),
+        count_(settings_.ranged.size()) {}
+
+  TracedSet Trace() {
+    if (space_.over() > 2) {
+      set_.summary.stop = Stop::kUnsupported;
+      set_.summary.message = "a range of further coordinates is asked of one or two free ones";
+      return std::move(set_);
+    }
+    double before = kNan, change_before = kNan;
+    for (int intervals = kFewestValues;; intervals *= 2) {
+      spacing_ = kFinest / intervals;
+      if (!TraceValues()) return std::move(set_);
+      const double line_error = Measure();
+      const double change = std::abs(set_.measure - before);
+      // What is left, where changes go on to fall as they do: by 4, by 2 where a corner moves.
+      const double rest = change_before > 1.2 * change ? change / (change_before / change - 1.0)
+                          : std::isfinite(change)      ? 5.0 * change
+                                                       : set_.measure;
+      set_.error = line_error + largest_error_ + std::max(change, 1.2 * rest);
+      before = set_.measure;
+      change_before = change;
+      const double next = std::pow(2 * intervals + 1, static_cast<double>(count_));
+      if (change <= kRests * set_.measure || next > kMostValues || 2 * intervals > kFinest) break;
+    }
+    Collect();
+    set_.summary = RunSummary::Done();
+    return std::move(set_);
+  }
+
+ private:
+  static constexpr int kFinest = 64;
+  struct AtValue {
+    TracedSet traced;
+    std::vector<Spans> rows;
+  };
+
+  [[nodiscard]] double ValueOf(const ValueKey& key, size_t r) const {
+    const CoordinateRange& range = settings_.ranged[r].range;
+    return range.lower + (range.upper - range.lower) * key.at(r) / kFinest;
+  }
+
+  // All values of the present spacing, from neighbour to neighbour.
+  bool TraceValues() {
+    std::vector<ValueKey> open;
+    ValueKey key{};
+    const auto all = [&](auto&& self, size_t r) -> void {
+      if (r == count_) {
+        if (!values_.contains(key)) open.push_back(key);
+        return;
+      }
+      for (int i = 0; i <= kFinest; i += spacing_) {
+        key.at(r) = i;
+        self(self, r + 1);
+      }
+    };
+    all(all, 0);
+    while (!open.empty()) {
+      std::vector<ValueKey> wave, rest;
+      for (const ValueKey& k : open) (Neighbours(k).empty() ? rest : wave).push_back(k);
+      if (wave.empty()) {  // the first one: nearest to the start
+        const auto far = [&](const ValueKey& k) {
+          double sum = 0.0;
+          for (size_t r = 0; r < count_; ++r) {
+            const RangedCoordinate& ranged = settings_.ranged[r];
+            sum += std::abs(ValueOf(k, r) - start_.pose.at[ranged.coordinate]) /
+                   (ranged.range.upper - ranged.range.lower);
+          }
+          return sum;
+        };
+        const auto first = std::ranges::min_element(rest, {}, far);
+        wave.push_back(*first);
+        rest.erase(first);
+      }
+      std::vector<AtValue> found(wave.size());
+      std::atomic<size_t> next = 0;
+      const auto run = [&] {
+        for (size_t i = next++; i < wave.size(); i = next++) found[i] = TraceAt(wave[i]);
+      };
+      std::vector<std::thread> others;
+      for (int t = 1; t < threads_ && static_cast<size_t>(t) < wave.size(); ++t) {
+        others.emplace_back(run);
+      }
+      run();
+      for (std::thread& other : others) other.join();
+      for (size_t i = 0; i < wave.size(); ++i) {
+        const TracedSet& traced = found[i].traced;
+        set_.closings += traced.closings;
+        if (!traced.summary.ok()) {
+          set_.summary = traced.summary;
+          return false;
+        }
+        largest_error_ = std::max(largest_error_, traced.error);
+        values_[wave[i]] = std::move(found[i]);
+      }
+      open = std::move(rest);
+      if (progress_) {
+        const double most = std::pow(kFinest + 1.0, static_cast<double>(count_));
+        progress_(static_cast<double>(values_.size()) /
+                  std::min(most, static_cast<double>(kMostValues)));
+      }
+    }
+    return true;
+  }
+
+  [[nodiscard]] std::vector<const AtValue*> Neighbours(const ValueKey& key) const {
+    std::vector<const AtValue*> neighbours;
+    for (size_t r = 0; r < count_; ++r) {
+      for (const int sign : {-1, 1}) {
+        ValueKey other = key;
+        other.at(r) += sign * spacing_;
+        const auto at = values_.find(other);
+        if (at != values_.end()) neighbours.push_back(&at->second);
+      }
+    }
+    return neighbours;
+  }
+
+  [[nodiscard]] AtValue TraceAt(const ValueKey& key) const {
+    PoseSpace own = space_;
+    std::vector<PlacedPose> seeds;
+    const long before = own.closings();
+    for (size_t r = 0; r < count_; ++r) own.Hold(settings_.ranged[r].coordinate, ValueOf(key, r));
+    const auto offer = [&](const SpacePose& pose) {
+      PlacedPose from, to;
+      VecX target = pose.at;
+      for (size_t r = 0; r < count_; ++r) target[settings_.ranged[r].coordinate] = ValueOf(key, r);
+      if (own.Place(pose, &from) && own.Close(from, target, &to) &&
+          to.pose.margin.minCoeff() > 0.0) {
+        seeds.push_back(std::move(to));
+      }
+    };
+    offer(start_.pose);
+    for (const AtValue* neighbour : Neighbours(key)) {
+      for (const SpacePose& pose : neighbour->traced.inside) offer(pose);
+    }
+    AtValue value;
+    if (seeds.empty()) {
+      value.traced.summary = RunSummary::Done();
+      value.traced.measure = value.traced.error = 0.0;
+    } else {
+      value.traced = TraceFrom(own, seeds);
+    }
+    value.traced.closings = own.closings() - before + value.traced.closings;
+    return value;
+  }
+
+  // The measure of all sections together; returns the scan lines' share of its error.
+  double Measure() {
+    const bool flat = space_.over() == 2;
+    if (flat) {
+      low_ = std::numeric_limits<double>::infinity();
+      double high = -low_;
+      for (const auto& [key, value] : values_) {
+        ForEachArc(value, [&](const TracedArc& arc) {
+          for (const Vec2& p : arc.points) {
+            low_ = std::min(low_, p[1]);
+            high = std::max(high, p[1]);
+          }
+        });
+      }
+      line_ = high > low_ ? (high - low_) / kLines : 1.0;
+    } else {
+      line_ = 1.0;
+    }
+    region_.clear();
+    bool first = true;
+    for (auto& [key, value] : values_) {
+      FillRows(flat, key, &value);
+      if (first) region_ = value.rows;
+      for (size_t row = 0; row < region_.size() && !first; ++row) {
+        region_[row] = Combined(region_[row], value.rows[row], settings_.for_all);
+      }
+      first = false;
+    }
+    double sum = 0.0, every_third = 0.0;
+    for (size_t row = 0; row < region_.size(); ++row) {
+      double length = 0.0;
+      for (const auto& [a, b] : region_[row]) length += b - a;
+      sum += length;
+      if (row % 3 == 1) every_third += 3 * length;
+    }
+    set_.measure = sum * line_;
+    return flat ? std::abs(sum - every_third) * line_ : 0.0;
+  }
+
+  template <typename F>
+  static void ForEachArc(const AtValue& value, const F& f) {
+    for (const TracedSection& section : value.traced.sections) {
+      for (const TracedLoop& loop : section.loops) {
+        for (const TracedArc& arc : loop.arcs) f(Resampled(arc, kFiner));
+      }
+    }
+  }
+
+  // An end where it is the first (or last) one along the range: between values by parabolas.
+  [[nodiscard]] double EndAt(const ValueKey& key, size_t end) const {
+    const double middle = values_.at(key).traced.ends[end].first;
+    double sum = middle;
+    for (size_t r = 0; r < count_; ++r) {
+      std::array<double, 3> x = {-1.0, 0.0, 1.0}, y = {kNan, middle, kNan};
+      for (const int sign : {-1, 1}) {
+        ValueKey other = key;
+        other.at(r) += sign * spacing_;
+        const auto at = values_.find(other);
+        if (at != values_.end() && at->second.traced.ends.size() == 2) {
+          y.at(static_cast<size_t>(sign + 1)) = at->second.traced.ends[end].first;
+        }
+      }
+      const double sign = (end == 1) == settings_.for_all ? 1.0 : -1.0;  // a least or a largest end
+      if (!(sign * middle <= sign * y[0] && sign * middle <= sign * y[2])) continue;
+      const Parabola p(x, y);
+      if (p.bend == 0.0) continue;
+      sum += p.at(-0.5 * p.slope / p.bend) - middle;
+    }
+    return sum;
+  }
+
+  void FillRows(bool flat, const ValueKey& key, AtValue* value) const {
+    value->rows.assign(flat ? kLines : 1, {});
+    if (!flat) {
+      const auto& ends = value->traced.ends;
+      if (ends.size() == 2) value->rows[0].emplace_back(EndAt(key, 0), EndAt(key, 1));
+      return;
+    }
+    std::vector<std::vector<double>> crossings(kLines);
+    ForEachArc(*value, [&](const TracedArc& arc) {
+      for (size_t k = 1; k < arc.points.size(); ++k) {
+        const Vec2 &a = arc.points[k - 1], &b = arc.points[k];
+        const auto [low, high] = std::minmax(a[1], b[1]);
+        const auto first = static_cast<long>(std::ceil((low - low_) / line_ - 0.5));
+        for (long row = std::max(first, 0L); row < kLines; ++row) {
+          const double y = low_ + (static_cast<double>(row) + 0.5) * line_;
+          if (y >= high) break;
+          if (y < low) continue;
+          crossings[static_cast<size_t>(row)].push_back(a[0] +
+                                                        (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]));
+        }
+      }
+    });
+    for (size_t row = 0; row < kLines; ++row) {
+      std::ranges::sort(crossings[row]);
+      for (size_t k = 0; k + 1 < crossings[row].size(); k += 2) {
+        value->rows[row].emplace_back(crossings[row][k], crossings[row][k + 1]);
+      }
+    }
+  }
+
+  [[nodiscard]] size_t RowOf(double y) const {
+    return static_cast<size_t>(std::clamp((y - low_) / line_, 0.0, kLines - 1.0));
+  }
+
+  // Pieces of the boundaries that are the boundary of all together, and poses inside.
+  void Collect() {
+    TracedSection section;
+    section.area = set_.measure;
+    section.error = set_.error;
+    TracedLoop loop;
+    std::array<std::pair<double, int>, 2> ends;
+    bool first = true;
+    for (const auto& [key, value] : values_) {
+      for (const SpacePose& pose : value.traced.inside) {
+        const size_t row = space_.over() == 2 ? RowOf(pose.at[1]) : 0;
+        if (Contains(region_[row], pose.at[0])) set_.inside.push_back(pose);
+      }
+      for (size_t e = 0; e < value.traced.ends.size(); ++e) {
+        const std::pair<double, int> end = {EndAt(key, e), value.traced.ends[e].second};
+        const bool farther = (end.first > ends.at(e).first) == (e == 1);
+        if (first || farther != settings_.for_all) ends.at(e) = end;
+      }
+      first = first && value.traced.ends.empty();
+      if (space_.over() != 2) continue;
+      ForEachArc(value, [&](const TracedArc& arc) {
+        TracedArc piece{arc.bound, {}};
+        const auto end_piece = [&] {
+          if (piece.points.size() > 1) loop.arcs.push_back(piece);
+          piece.points.clear();
+        };
+        for (const Vec2& p : arc.points) {
+          const bool keep = std::ranges::all_of(values_, [&, k = key](const auto& other) {
+            return other.first == k ||
+                   Contains(other.second.rows[RowOf(p[1])], p[0]) == settings_.for_all;
+          });
+          if (keep) {
+            piece.points.push_back(p);
+          } else {
+            end_piece();
+          }
+        }
+        end_piece();
+      });
+    }
+    if (space_.over() == 2) {
+      section.loops.push_back(std::move(loop));
+      set_.sections.push_back(std::move(section));
+    } else if (!first) {
+      set_.ends.assign(ends.begin(), ends.end());
+    }
+  }
+
+  const PoseSpace& space_;
+  const SpaceSettings& settings_;
+  const PlacedPose& start_;
+  const int threads_;
+  const std::function<void(double)>& progress_;
+  const size_t count_;
+  int spacing_ = kFinest;
+  std::map<ValueKey, AtValue> values_;
+  std::vector<Spans> region_;
+  double low_ = 0.0, line_ = 1.0, largest_error_ = 0.0;
+  TracedSet set_;
+};
+
+}  // namespace
+
+TracedSet TraceRange(const PoseSpace& space, const PlacedPose& start, int threads,
+                     const std::function<void(double)>& progress) {
+  const auto began = std::chrono::steady_clock::now();
+  TracedSet set = RangeTracer(space, start, threads, progress).Trace();
+  set.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return set;
+}
+
+}  // namespace mbv
