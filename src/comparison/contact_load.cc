@@ -1,10 +1,13 @@
 #include "comparison/contact_load.h"
 
 #include <fmt/format.h>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <optional>
 
 #include "base/text.h"
 #include "mechanism/channels.h"
@@ -138,6 +141,7 @@ std::vector<int> ComponentsOf(Limit limit) {
     case Limit::kTip:
       return {2, 3, 4};
     case Limit::kTwist:
+    case Limit::kFall:
       return {0, 1, 2, 3, 4, 5};
   }
   return {};
@@ -212,6 +216,153 @@ ContactLoad Together(const std::vector<Foot>& feet, const std::vector<Pose>& pla
   return load;
 }
 
+// (5): pushing forces at corners, as multiples x ≥ 0 of the edges of their pyramids, G x = w.
+class PushingForces {
+ public:
+  PushingForces(const std::vector<Foot>& feet, double length_m) : length_m_(length_m) {
+    std::vector<Vec3> corners;
+    for (const Foot& foot : feet) {
+      for (const Eigen::Vector2d& p : CornersOf(*foot.contact)) {
+        corners.push_back(foot.joint->X_PF * Vec3(p.x(), p.y(), 0.0));
+        middle_ += corners.back();
+      }
+    }
+    middle_ /= static_cast<double>(corners.size());
+    G_.resize(6, kSides * static_cast<Eigen::Index>(corners.size()));
+    push_ = friction_ = G_;
+    Eigen::Index column = 0;
+    size_t corner = 0;
+    for (const Foot& foot : feet) {
+      const Mat3& R = foot.joint->X_PF.linear();
+      for (size_t k = 0; k < CornersOf(*foot.contact).size(); ++k, ++corner) {
+        for (int side = 0; side < kSides; ++side, ++column) {
+          const double angle = 2.0 * std::numbers::pi * side / kSides;
+          const Vec3 across(std::cos(angle), std::sin(angle), 0.0), p = corners[corner] - middle_;
+          push_.col(column) = WrenchAt(p, R.col(2));
+          friction_.col(column) = foot.contact->friction * WrenchAt(p, R * across);
+        }
+      }
+    }
+  }
+
+  /// About the middle of the corners, per characteristic length, of the feet's at a sample.
+  [[nodiscard]] Vec6 SumOf(const std::vector<Foot>& feet, size_t i) const {
+    Vec6 w = Vec6::Zero();
+    for (const Foot& foot : feet) {
+      const Mat3& R = foot.joint->X_PF.linear();
+      const Vec3 f = R * foot.wrenches[i].head<3>();
+      const Vec3 p = foot.joint->X_PF.translation() - middle_;
+      w.head<3>() += f;
+      w.tail<3>() += (R * foot.wrenches[i].tail<3>() + p.cross(f)) / length_m_;
+    }
+    return w;
+  }
+
+  /// The least s of (5), to 1e-3 of it, from below 1 on to 2e-4; infinite above `kMost`.
+  double LeastFriction(const Vec6& w) {
+    constexpr double kMost = 1024.0;
+    double most = 1.0, least = 0.0;
+    while (!Hold(w, most)) {
+      least = most;
+      most *= 2.0;
+      if (most > kMost) return std::numeric_limits<double>::infinity();
+    }
+    for (int i = 0; i < 12; ++i) {
+      const double between = 0.5 * (least + most);
+      (Hold(w, between) ? most : least) = between;
+    }
+    return most;
+  }
+
+ private:
+  static constexpr int kSides = 32;
+
+  static std::vector<Eigen::Vector2d> CornersOf(const Contact& contact) {
+    if (contact.kind == Contact::Kind::kPoint) return {Eigen::Vector2d::Zero()};
+    return contact.outline;
+  }
+  [[nodiscard]] Vec6 WrenchAt(const Vec3& p, const Vec3& f) const {
+    return (Vec6() << f, p.cross(f) / length_m_).finished();
+  }
+
+  // Non-negative least squares [Lawson, Hanson 1974, ch. 23].
+  bool Hold(const Vec6& w, double s) {
+    constexpr double kHolds = 1e-7, kOut = 1e-10;  // of w, of unit columns
+    G_ = (push_ + s * friction_).colwise().normalized();
+    taken_.clear();
+    Vec6 left = w;
+    for (int step = 0; step < kMostSteps && left.norm() > kHolds * w.norm(); ++step) {
+      Eigen::Index best = 0;
+      if ((G_.transpose() * left).maxCoeff(&best) <= kOut * w.norm()) return false;
+      if (std::ranges::find(taken_, best, &Share::column) != taken_.end()) return false;
+      taken_.push_back({best, 0.0});
+      while (!Balance(w, &left)) {
+      }
+    }
+    return left.norm() <= kHolds * w.norm();
+  }
+
+  // Least squares of what is taken; false where one would pull, which is then given up.
+  bool Balance(const Vec6& w, Vec6* left) {
+    const auto n = static_cast<Eigen::Index>(taken_.size());
+    Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 7> A(6, n);
+    for (Eigen::Index k = 0; k < n; ++k) A.col(k) = G_.col(taken_[static_cast<size_t>(k)].column);
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 7, 1> x =
+        A.completeOrthogonalDecomposition().solve(w);
+    double step = 1.0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double now = taken_[static_cast<size_t>(k)].force;
+      if (x[k] <= 0.0) step = std::min(step, now / (now - x[k]));
+    }
+    for (Eigen::Index k = 0; k < n; ++k) {
+      double& force = taken_[static_cast<size_t>(k)].force;
+      force += step * (x[k] - force);
+    }
+    if (step < 1.0) {
+      const double nothing = kEps * w.norm();
+      std::erase_if(taken_, [&](const Share& share) { return share.force <= nothing; });
+      return false;
+    }
+    *left = w - A * x;
+    return true;
+  }
+
+  struct Share {
+    Eigen::Index column;
+    double force;
+  };
+  static constexpr int kMostSteps = 300;
+  double length_m_;
+  Vec3 middle_ = Vec3::Zero();
+  /// Wrenches of pushing and of friction along the edges, per normal force; their sum.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> push_, friction_, G_;
+  std::vector<Share> taken_;
+};
+
+// On ground that is not one plane.
+std::optional<ContactLoad> OnAnyGround(const std::vector<Foot>& feet, const Trace& trace,
+                                       double scale_N, double length_m) {
+  for (const Foot& foot : feet) {
+    const bool point = foot.contact->kind == Contact::Kind::kPoint;
+    if (std::isnan(foot.contact->friction) || (!point && foot.contact->outline.empty())) return {};
+  }
+  ContactLoad load{.witness = trace.witness};
+  ContactLoad::Use fall{.limit = Limit::kFall, .allowed = 1.0};
+  PushingForces forces(feet, length_m);
+  for (size_t i = 0; i < trace.time_s.size(); ++i) {
+    const Vec6 w = forces.SumOf(feet, i);
+    if (w.norm() <= kNothing * scale_N) continue;
+    const double s = forces.LeastFriction(w);
+    if (!(s <= fall.worst)) {
+      fall.worst = s;
+      fall.time_s = trace.time_s[i];
+    }
+    if (s > fall.allowed && fall.beyond++ == 0) fall.from_s = trace.time_s[i];
+  }
+  if (!std::isnan(fall.worst)) load.uses.push_back(fall);
+  return load;
+}
+
 std::string Since(const ContactLoad::Use& use) {
   return use.beyond == 1 ? ""
                          : fmt::format("; from {:.4g} s on, {} samples", use.from_s, use.beyond);
@@ -229,7 +380,7 @@ bool ContactLoad::unique() const {
 }
 
 const char* ToText(ContactLoad::Limit limit) {
-  static constexpr std::array<const char*, 4> kWords = {"lift", "slip", "tip", "twist"};
+  static constexpr std::array<const char*, 5> kWords = {"lift", "slip", "tip", "twist", "fall"};
   return kWords.at(static_cast<size_t>(limit));
 }
 
@@ -261,7 +412,11 @@ std::vector<ContactLoad> ContactLoadsOf(const Mechanism& mechanism, const Trace&
   }
   if (feet.size() < 2 || !BearAll(mechanism, feet)) return loads;
   const std::vector<Pose> places = PlacesOnOnePlane(mechanism, feet);
-  if (!places.empty()) loads.push_back(Together(feet, places, trace, scale_N, length_m));
+  if (!places.empty()) {
+    loads.push_back(Together(feet, places, trace, scale_N, length_m));
+  } else if (auto load = OnAnyGround(feet, trace, scale_N, length_m)) {
+    loads.push_back(std::move(*load));
+  }
   return loads;
 }
 
@@ -288,6 +443,15 @@ std::string ExceededText(const ContactLoad& load, const ContactLoad::Use& use) {
       what =
           fmt::format("the moment about the normal has a lever of {:.4g} mm, torsion states {:.4g}",
                       1e3 * use.worst, 1e3 * use.allowed);
+      break;
+    case Limit::kFall:
+      verb = "fall";
+      what = std::isinf(use.worst)
+                 ? "no forces that push where they stand hold the robot, whatever the friction,"
+                 : fmt::format(
+                       "to hold, all coefficients of friction would have to be {:.3g} times "
+                       "what is stated",
+                       use.worst);
       break;
   }
   return fmt::format("{} {}{}: {} at {:.4g} s{}{}", load.name(), verb,

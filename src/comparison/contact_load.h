@@ -8,7 +8,14 @@
 //                                  foot twists beyond `torsion`                           (4)
 //
 // with force and moment of the ground on the foot in the contact's frame. Of all feet on one plane
-// together the sums of (1) to (3) follow from the motion alone, whatever the feet share.
+// together the sums of (1) to (3) follow from the motion alone, whatever the feet share. On ground
+// of any shape it is the sum w of their wrenches that follows; the ground holds the robot where
+//
+//   w = Σ_v [f_v; p_v × f_v],  f_v · n_v ≥ 0,  |f_v − n_v (f_v · n_v)| ≤ s μ_v f_v · n_v        (5)
+//
+// has a solution with s = 1: forces f_v that push at the corners p_v of the outlines and at the
+// points, within friction [Hirukawa et al. 2006]. Judged by the least s; friction cones are
+// pyramids of 32 sides inside them, which makes s up to 0.5 % too large.
 #pragma once
 
 #include <string>
@@ -21,11 +28,12 @@ namespace mbv {
 
 /// Over the samples of one witness.
 struct ContactLoad {
-  enum class Limit { kLift, kSlip, kTip, kTwist };
+  enum class Limit { kLift, kSlip, kTip, kTwist, kFall };
   struct Use {
     Limit limit = Limit::kLift;
     /// The least normal force [N], the largest (2) [1], the least distance of the centre of
-    /// pressure from the outline's edges, negative outside [m], the largest (4) [m].
+    /// pressure from the outline's edges, negative outside [m], the largest (4) [m], the largest
+    /// least s of (5) [1], infinite where no friction would do.
     double worst = kNan;
     double time_s = kNan;   ///< of it
     double allowed = kNan;  ///< least, or largest value that the ground bears; NaN: not stated
@@ -49,12 +57,13 @@ struct ContactLoad {
   [[nodiscard]] bool unique() const;  ///< all of them
 };
 
-/// "lift", "slip", "tip", "twist".
+/// "lift", "slip", "tip", "twist", "fall".
 [[nodiscard]] const char* ToText(ContactLoad::Limit limit);
 
-/// Of every contact that holds; then of all together, if there are several on one plane and nothing
-/// else ties the robot to the ground. Empty where the witness records no reactions. `not_unique`:
-/// channels of reactions that statics leaves open.
+/// Of every contact that holds; then of all together, if there are several and nothing else ties
+/// the robot to the ground: of feet that do not stand on one plane by (5), if all of them state
+/// friction and what touches the ground. Empty where the witness records no reactions.
+/// `not_unique`: channels of reactions that statics leaves open.
 [[nodiscard]] std::vector<ContactLoad> ContactLoadsOf(const Mechanism& mechanism,
                                                       const Trace& trace,
                                                       const std::vector<std::string>& not_unique);

@@ -146,7 +146,8 @@ std::vector<size_t> StuckDrives(const Mechanism& mechanism) {
 
 CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                    const std::vector<Coordinate>& candidates, size_t preferred) {
-  constexpr double kIndependent = 1e-5;  // share of a gradient that others do not hold
+  // Share of a gradient that others do not hold. Forces of what is chosen grow by its inverse.
+  constexpr double kWell = 1e-2, kIndependent = 1e-5;
   // What is chosen is taken out of those that are left.
   MatX gradients = GradientsInDofs(mechanism, candidates);
   CoordinateChoice choice{
@@ -157,14 +158,18 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
     const Eigen::RowVectorXd direction = gradients.row(k).normalized();
     gradients -= (gradients * direction.transpose()) * direction;
   };
-  for (size_t k = 0; k < preferred && choice.left() >= 0; ++k) {
-    const auto row = static_cast<Eigen::Index>(k);
-    if (gradients.row(row).norm() > std::max(kIndependent * lengths[row], kStill)) {
+  // What hardly differs from the others is taken only where nothing better is preferred.
+  std::vector<size_t>& rest = choice.dependent;
+  for (size_t k = 0; k < preferred; ++k) rest.push_back(k);
+  for (const double share : {kWell, kIndependent}) {
+    std::erase_if(rest, [&](size_t k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      if (!(gradients.row(row).norm() > std::max(share * lengths[row], kStill))) return false;
       take(row);
-    } else {
-      choice.dependent.push_back(k);
-    }
+      return true;
+    });
   }
+  std::ranges::sort(choice.chosen);
   while (choice.left() > 0 && gradients.rows() > 0) {
     Eigen::Index best = 0;
     const double most = gradients.rowwise().norm().maxCoeff(&best);

@@ -38,8 +38,9 @@ struct CoordinateChoice {
   [[nodiscard]] int left() const { return dofs - static_cast<int>(chosen.size()); }
 };
 
-/// Takes the first `preferred` candidates in their order, as far as they are independent at home,
-/// then of the rest what moves most while those before are held.
+/// Takes the first `preferred` candidates in their order, as far as they are independent at home
+/// (first those of which the others hold less than 99 %), then of the rest what moves most while
+/// those before are held.
 [[nodiscard]] CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                                  const std::vector<Coordinate>& candidates,
                                                  size_t preferred);

@@ -154,17 +154,9 @@ SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& h
 }
 
 std::vector<int> BodiesBeyond(const Mechanism& mechanism, int joint) {
-  std::vector<int> bodies{mechanism.joints[static_cast<size_t>(joint)].child};
-  if (bodies[0] == 0) return {};
-  for (size_t next = 0; next < bodies.size(); ++next) {
-    for (const int j : mechanism.tree_joints) {
-      const Joint& other = mechanism.joints[static_cast<size_t>(j)];
-      if (j == joint || other.parent == 0 || other.child == 0) continue;
-      if (other.parent != bodies[next] && other.child != bodies[next]) continue;
-      const int there = other.parent == bodies[next] ? other.child : other.parent;
-      if (std::ranges::find(bodies, there) == bodies.end()) bodies.push_back(there);
-    }
-  }
+  std::vector<int> bodies;
+  VisitBeyond(mechanism, joint, mechanism.joints[static_cast<size_t>(joint)].child,
+              [&](int body) { bodies.push_back(body); });
   return bodies;
 }
 

@@ -34,6 +34,19 @@ SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& h
 /// True when one of these or a force element uses a coordinate of this joint.
 [[nodiscard]] bool HasUsedCoordinate(const Mechanism& mechanism, int joint);
 
+/// visit(body) of `body` and of those that tree joints other than `joint` join with it, where all
+/// bodies' joints with the world are cut. Nothing is allocated.
+template <typename Visit>
+void VisitBeyond(const Mechanism& mechanism, int joint, int body, const Visit& visit) {
+  if (body == 0) return;
+  visit(body);
+  for (const int j : mechanism.tree_joints) {
+    const Joint& other = mechanism.joints[static_cast<size_t>(j)];
+    if (j == joint || (other.parent != body && other.child != body)) continue;
+    VisitBeyond(mechanism, j, other.parent == body ? other.child : other.parent, visit);
+  }
+}
+
 /// Bodies that tree joints join with a joint's child, where the joint and all bodies' joints with
 /// the world are cut: what a tree joint carries, wherever the world holds the tree.
 [[nodiscard]] std::vector<int> BodiesBeyond(const Mechanism& mechanism, int joint);

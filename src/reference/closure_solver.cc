@@ -357,7 +357,7 @@ RunSummary ClosureSolver::CheckHere() {
     summary.unit = rows_.angular[worst] ? "rad" : "m";
     return summary;
   }
-  const double sigma = system_.SmallestSingularValue(1);
+  const double sigma = control_ = system_.SmallestSingularValue(1);
   if (sigma < SingularValueLimit(rounding / length_)) {
     RunSummary summary = Singular(fmt::format(
         "the commands do not hold the mechanism at this pose (smallest singular value {:.1e})",

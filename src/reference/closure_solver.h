@@ -55,6 +55,8 @@ class ClosureSolver {
   /// Largest translation and rotation residual over all joints.
   [[nodiscard]] double gap_position_m() const { return gap_position_m_; }
   [[nodiscard]] double gap_rotation_rad() const { return gap_rotation_rad_; }
+  /// Smallest singular value of the rows at the last pose (estimate, dimensionless).
+  [[nodiscard]] double control() const { return control_; }
 
  private:
   enum class Step { kDone, kSlow, kFar, kSingular };
@@ -150,6 +152,7 @@ class ClosureSolver {
   };
   std::vector<LastLine> last_lines_;  ///< of the last sample, per spin; empty: there is none
   double gap_position_m_ = kNan, gap_rotation_rad_ = kNan;
+  double control_ = kNan;
 };
 
 /// Moves all bodies by small twists: R ← exp(δω) R, p ← p + δv; keeps rotations orthonormal.

@@ -467,40 +467,39 @@ LoadInWorld InWorld(const Mechanism& mechanism, const BodyStates& states,
   return {R * load.force, R * load.moment, R * load.p_BoQ_B};
 }
 
-// Of gravity compensation, per body: [moment about Bo; force] in world axes. A drive that exerts
+// Of gravity compensation: add(body, [moment about Bo; force] in world axes). A drive that exerts
 // its joint's part takes it away there, so that the drive's own force has to supply it:
-//   f_b = −s_b m_b g at the centre of mass, s_b the share (1) Q = a · Σ_b (c_b − p) × f_b about the
-//   axis a through p, a · Σ_b f_b along it                  (2)
+//   f_b = −s_b m_b g at the centre of mass, s_b the share                                       (1)
+//   Q = a · Σ_b (c_b − p) × f_b about the axis a through p, a · Σ_b f_b along it                (2)
 // over the bodies b beyond the joint; −Q acts on the child along the coordinate, Q on the parent.
-// Empty where there is none.
-std::vector<Vec6> CompensationWrenches(const Mechanism& mechanism, const BodyStates& states) {
-  if (!HasGravityCompensation(mechanism)) return {};
-  std::vector<Vec6> wrenches(mechanism.bodies.size(), Vec6::Zero());
-  std::vector<Vec3> forces(mechanism.bodies.size(), Vec3::Zero());
+template <typename Add>
+void Compensate(const Mechanism& mechanism, const BodyStates& states, const Add& add) {
+  if (!HasGravityCompensation(mechanism)) return;
+  const auto force = [&](const Body& body) {
+    return Vec3(-body.gravity_compensation * body.mass * mechanism.gravity_W);  // (1)
+  };
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
-    const Body& body = mechanism.bodies[b];
-    forces[b] = -body.gravity_compensation * body.mass * mechanism.gravity_W;  // (1)
-    const Vec3 c = states.X_WB[b].linear() * body.p_BoBcm_B;
-    wrenches[b] << c.cross(forces[b]), forces[b];
+    const Vec3 c = states.X_WB[b].linear() * mechanism.bodies[b].p_BoBcm_B;
+    const Vec3 f = force(mechanism.bodies[b]);
+    add(b, (Vec6() << c.cross(f), f).finished());
   }
   for (const Drive& drive : mechanism.drives) {
     if (!drive.compensates_gravity) continue;
-    const auto& on = std::get<JointDrive>(drive.kind);
-    const Joint& joint = mechanism.joints[static_cast<size_t>(on.joint)];
+    const int on = std::get<JointDrive>(drive.kind).joint;
+    const Joint& joint = mechanism.joints[static_cast<size_t>(on)];
     const Pose X_WF = states.X_WB[static_cast<size_t>(joint.parent)] * joint.X_PF;
     const Vec3 a = X_WF.linear() * joint.axis, p = X_WF.translation();
+    const bool turns = joint.kind == JointKind::kRevolute;
     double Q = 0.0;
-    for (const int b : BodiesBeyond(mechanism, on.joint)) {
-      const auto k = static_cast<size_t>(b);
-      const Vec3 c = states.X_WB[k] * mechanism.bodies[k].p_BoBcm_B;
-      const bool turns = joint.kind == JointKind::kRevolute;
-      Q += a.dot(turns ? Vec3((c - p).cross(forces[k])) : forces[k]);  // (2)
-    }
+    VisitBeyond(mechanism, on, joint.child, [&](int b) {
+      const Body& body = mechanism.bodies[static_cast<size_t>(b)];
+      const Vec3 c = states.X_WB[static_cast<size_t>(b)] * body.p_BoBcm_B, f = force(body);
+      Q += a.dot(turns ? Vec3((c - p).cross(f)) : f);  // (2)
+    });
     const ScalarRow row = JointCoordinateRow(joint, 0, states);
-    wrenches[static_cast<size_t>(row.parent)] -= Q * row.J_parent;
-    wrenches[static_cast<size_t>(row.child)] -= Q * row.J_child;
+    add(static_cast<size_t>(row.parent), Vec6(-Q * row.J_parent));
+    add(static_cast<size_t>(row.child), Vec6(-Q * row.J_child));
   }
-  return wrenches;
 }
 
 }  // namespace
@@ -528,8 +527,7 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
     (*wrench_W)[load.body].head<3>() -= f.moment + f.p_BoQ.cross(f.force);
     (*wrench_W)[load.body].tail<3>() -= f.force;
   }
-  const std::vector<Vec6> compensation = CompensationWrenches(mechanism, states);
-  for (size_t b = 1; b < compensation.size(); ++b) (*wrench_W)[b] -= compensation[b];
+  Compensate(mechanism, states, [&](size_t b, const Vec6& wrench) { (*wrench_W)[b] -= wrench; });
   for (const SpringDamper& spring : mechanism.springs) {
     const ScalarRow row = LengthRow(spring, mechanism, states);
     const double thrust = -spring.stiffness * (row.value - spring.free_length_m) -
@@ -587,10 +585,8 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
     power.loads +=
         f.force.dot(states.V_WB[load.body].tail<3>() + w.cross(f.p_BoQ)) + f.moment.dot(w);
   }
-  const std::vector<Vec6> compensation = CompensationWrenches(mechanism, states);
-  for (size_t b = 1; b < compensation.size(); ++b) {
-    power.loads += compensation[b].dot(states.V_WB[b]);
-  }
+  Compensate(mechanism, states,
+             [&](size_t b, const Vec6& wrench) { power.loads += wrench.dot(states.V_WB[b]); });
   for (const SpringDamper& spring : mechanism.springs) {
     const ScalarRow row = LengthRow(spring, mechanism, states);
     const double rate = RateOf(row, states.V_WB);

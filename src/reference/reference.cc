@@ -33,6 +33,7 @@ RunSummary ReferenceSolver::Kinematics(const CommandSample& command, ReferenceSa
   sample->states = impl_->closure.states();
   sample->closure_position_m = impl_->closure.gap_position_m();
   sample->closure_rotation_rad = impl_->closure.gap_rotation_rad();
+  sample->control = impl_->closure.control();
   impl_->recorder.Record(sample);
   return RunSummary::Done();
 }

@@ -52,6 +52,7 @@ struct ReferenceSample {
   VecX load_friction;
   VecX drive_band, prescribed_band;  ///< half-widths of what friction at rest leaves open
   double closure_position_m = kNan, closure_rotation_rad = kNan;
+  double control = kNan;  ///< smallest singular value of loops and commands (dimensionless)
   Powers power;
   Energies energy;
   VecX work;  ///< free motion: since the start [J], as WorkChannels(); otherwise empty

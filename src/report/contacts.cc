@@ -45,6 +45,9 @@ Cell UseCell(const ContactLoad& load, Limit limit) {
                   ? fmt::format("{:.3g} mm", 1e3 * use->worst)
                   : fmt::format("{:.3g} of {:.3g} mm", 1e3 * use->worst, 1e3 * use->allowed),
               mark};
+    case Limit::kFall:
+      return {std::isinf(use->worst) ? "any fails" : fmt::format("{:.3g} × stated", use->worst),
+              mark};
   }
   return "–";
 }
@@ -95,7 +98,10 @@ ReportSection ContactSection(const Report& report) {
     const bool exceeded =
         std::ranges::any_of(load->uses, [](const ContactLoad::Use& use) { return use.exceeded(); });
     table.rows.push_back({load->name(), load->kind, UseCell(*load, Limit::kLift),
-                          fmt::format("{:.4g} N", load->most_normal), UseCell(*load, Limit::kSlip),
+                          std::isnan(load->most_normal)
+                              ? Cell("–")
+                              : Cell(fmt::format("{:.4g} N", load->most_normal)),
+                          UseCell(*load, load->Find(Limit::kFall) ? Limit::kFall : Limit::kSlip),
                           UseCell(*load, Limit::kTip), UseCell(*load, Limit::kTwist),
                           Cell(HoldText(*load), exceeded ? Mark::kWarn : Mark::kOk)});
   }
@@ -112,8 +118,8 @@ ReportSection ContactSection(const Report& report) {
   }
   if (loads.size() > 1 && !together) {
     section.Note(
-        "What all feet bear together is not judged: they do not stand on one plane, or something "
-        "else ties the robot to the ground.",
+        "What all feet bear together is not judged: something else ties the robot to the ground, "
+        "or they do not stand on one plane and some state no friction or size.",
         On::kAll);
   }
   for (const ContactLoad* load : loads) {

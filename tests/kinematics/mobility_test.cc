@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <random>
 
+#include "kinematics/command_rank.h"
 #include "kinematics/row_stack.h"
 #include "math/sparse.h"
 #include "mechanism/reach.h"
@@ -75,6 +76,36 @@ TEST(Mobility, AComponentThatIsUniqueAtHomeOnlyIsFoundOutByOtherPoses) {
                                       "turn.reaction.fx", "turn.reaction.fy"}));
   turned[2].linear().setConstant(kNan);
   EXPECT_EQ(ReactionsNotUnique(m, {turned}).size(), 3u);
+}
+
+// A plate in a plane, pushed by legs: two are parallel but for 1e-3, a third is across them.
+TEST(CommandRank, WhatHardlyDiffersFromOthersIsTakenWhereNothingBetterIsPreferred) {
+  Mechanism m;
+  m.bodies = {{.name = "world", .frames = {}, .shapes = {}},
+              {.name = "plate", .mass = 1.0, .frames = {}, .shapes = {}}};
+  Joint slide;
+  slide.kind = JointKind::kPlanar;
+  slide.child = 1;
+  m.joints = {slide};
+  m.X_WB_home.assign(2, Pose::Identity());
+  m.tree_joints = {0};
+  m.tree_reversed = {false};
+  const auto leg = [&](const Vec3& from, const Vec3& to) {
+    m.drives.push_back({.name = "leg", .kind = DistanceDrive{0, from, 1, to}, .range = {}});
+  };
+  leg({-1, 0.2, 0}, {0, 0.2, 0});
+  leg({-1, 0.2 + 1e-3, 0}, {0, 0.2, 0});
+  leg({0, -1, 0}, {0, 0, 0});
+  leg({-1, -0.2, 0}, {0, -0.2, 0});
+  const auto chosen = [&](const std::vector<int>& drives) {
+    std::vector<Coordinate> candidates;
+    for (const int d : drives) candidates.push_back({Coordinate::Kind::kDrive, d, 0});
+    return ChooseCoordinates(m, candidates, candidates.size());
+  };
+  EXPECT_EQ(chosen({0, 1, 2, 3}).chosen, (std::vector<size_t>{0, 2, 3}));
+  EXPECT_EQ(chosen({0, 1, 2, 3}).dependent, (std::vector<size_t>{1}));
+  EXPECT_EQ(chosen({0, 1, 3}).chosen, (std::vector<size_t>{0, 1, 2}));
+  EXPECT_EQ(chosen({0, 0, 3}).chosen, (std::vector<size_t>{0, 2}));
 }
 
 TEST(Mobility, TwoMotorsOnOneFreedomFightEachOther) {

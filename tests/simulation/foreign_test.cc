@@ -103,6 +103,9 @@ std::map<std::string, Sample> Samples() {
       {"option viscosity", {option("viscosity='1e-3'"), option("viscosity='0'")}},
       {"option wind", {option("density='1.2' wind='1 0 0'"), option("wind='1 0 0'")}},
       {"asset/mesh inertia", {of_mesh("inertia='shell'"), of_mesh("inertia='legacy'")}},
+      {"limit without room range",
+       {joint("limited='true' range='-0.1 0.1' margin='0.2'"),
+        joint("limited='true' range='-0.1 0.1' margin='0.01'")}},
       {"any joint damping", {joint("damping='-0.1'"), joint("damping='0.1'")}},
       {"stiffness 2nd", {joint("stiffness='3 1 2'"), joint("stiffness='3 0 0'")}},
       {"springlength 2nd",
@@ -412,6 +415,53 @@ TEST(ForeignMjcf, ARangeCountsFromTheReferenceAndEndsAtItsMargin) {
   EXPECT_NEAR(range("").upper, 1.2, 1e-15);
   EXPECT_NEAR(range(" margin='0.1'").lower, -0.6, 1e-15);
   EXPECT_NEAR(range(" margin='0.1'").upper, 1.1, 1e-15);
+}
+
+// As MuJoCo 3.14 reads ranges without room (lower ≥ upper): none where `limited` is auto or false,
+// refused where it is true, but for a ball, which is then pushed back at any rotation.
+TEST(ForeignMjcf, ARangeWithoutRoomIsNoneUnlessTheFileLimitsIt) {
+  for (const char* range : {"0 0", "1 -1", "0 -1"}) {
+    for (const char* limited : {"", "auto", "true", "false"}) {
+      const bool holds = std::string_view(limited) == "true";
+      const auto stated = [&](const char* prefix) {
+        const std::string text = fmt::format(" {}range='{}'", prefix, range);
+        return *limited == '\0' ? text : text + fmt::format(" {}limited='{}'", prefix, limited);
+      };
+      for (const char* type : {"hinge", "slide", "ball"}) {
+        if (std::string_view(type) == "ball" && holds && *range == '1') continue;  // refused, too
+        const Read read = ReadText(Arm({.joint = fmt::format("type='{}'", type) + stated("")}));
+        const bool ball = std::string_view(type) == "ball";
+        ASSERT_EQ(read.model.has_value(), !holds || ball)
+            << type << range << limited << read.diagnostics.Text();
+        if (!read.model) continue;
+        const Joint& joint = read.model->mechanism.joints[0];
+        EXPECT_TRUE(std::isinf(joint.range[0].upper) && std::isinf(joint.max_rotation));
+        EXPECT_EQ(Sources(read).contains("limit without room range"), holds) << type << limited;
+        EXPECT_EQ(read.diagnostics.Text().find("without `limited` hold"), std::string::npos);
+      }
+      for (const char* of : {"ctrl", "force", "actuatorfrc"}) {
+        const bool on_joint = std::string_view(of) == "actuatorfrc";
+        const Read read = ReadText(Arm({.joint = on_joint ? stated(of) : "",
+                                        .tail = "<actuator><motor joint='A' gear='2'" +
+                                                (on_joint ? "" : stated(of)) + "/></actuator>"}));
+        ASSERT_EQ(read.model.has_value(), !holds)
+            << of << range << limited << read.diagnostics.Text();
+        if (!read.model) continue;
+        ASSERT_EQ(read.model->mechanism.motors.size(), 1u) << of << range << limited;
+        EXPECT_EQ(read.model->mechanism.motors[0].peak, Motor::kNoLimit);
+      }
+    }
+  }
+}
+
+// Limits of a default class are the element's own: nothing is left open.
+TEST(ForeignMjcf, LimitsThatAClassStatesAreStated) {
+  const Read read = ReadText(
+      Arm({.head = "<default><default class='c'><joint limited='true'/></default></default>",
+           .joint = "class='c' range='-1 1'"}));
+  ASSERT_TRUE(read.model) << read.diagnostics.Text();
+  EXPECT_EQ(read.diagnostics.Text().find("without `limited`"), std::string::npos);
+  EXPECT_NEAR(read.model->mechanism.joints[0].range[0].upper, 1.0, 1e-15);
 }
 
 // A frame is what stands in it, posed; written out by hand it is the same mechanism.

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "math/spatial.h"
+#include "mechanism/spanning_tree.h"
 #include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
 #include "simulation/engine/simulation.h"
@@ -84,7 +85,9 @@ Motion Wobble(const Mechanism& m) {
 
 // Largest difference, over the largest moment, between what the legs' moments about the ball's or
 // the connection's centre are and what the plate needs by hand.
-double ErrorByHand(const Mechanism& m, const Laws& laws, bool free) {
+// `R_PM`: axes about which friction is limited.
+double ErrorByHand(const Mechanism& m, const Laws& laws, bool free,
+                   const Mat3& R_PM = Mat3::Identity()) {
   const Motion motion = Wobble(m);
   ReferenceSolver solver(m, motion);
   ReferenceSample sample;
@@ -122,7 +125,7 @@ double ErrorByHand(const Mechanism& m, const Laws& laws, bool free) {
                                     m.X_WB_home[plate].linear());
     const Vec3 rate = R.transpose() * (w - w_T),
                rate_rate = R.transpose() * (e - e_T + w.cross(w_T));
-    const Vec3 sign = rate.cwiseSign();
+    const Vec3 sign = R_PM * (R_PM.transpose() * rate).cwiseSign();
     needed += R * (laws.damping * rate + laws.armature * rate_rate + laws.friction * sign) +
               laws.stiffness * R_home * LogRotation(R_home.transpose() * R);
     // … and of a free joint its origin's velocity in the world's axes.
@@ -182,6 +185,15 @@ double Difference(const Trace& a, const Trace& b, const Mechanism& m) {
   return error / size;
 }
 
+DrivenMotion Following(const Motion& motion) {
+  return [motion](double t, DrivenSample* driven) {
+    CommandSample command;
+    EvaluateMotion(motion, t, &command);
+    *driven = {command.position, command.velocity, command.acceleration};
+    return RunSummary::Done();
+  };
+}
+
 TEST(RoundJoints, MuJoCoFindsTheSameForces) {
   for (const bool free : {false, true}) {
     Laws smooth;
@@ -192,13 +204,7 @@ TEST(RoundJoints, MuJoCoFindsTheSameForces) {
       const ReferenceRun reference = RunReference(m, motion);
       ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
       const auto run = [&](const Mechanism& of, DriveMode mode) {
-        const DrivenMotion commanded = [&](double t, DrivenSample* driven) {
-          CommandSample command;
-          EvaluateMotion(motion, t, &command);
-          *driven = {command.position, command.velocity, command.acceleration};
-          return RunSummary::Done();
-        };
-        return Simulate(of, motion, commanded, {.mode = mode});
+        return Simulate(of, motion, Following(motion), {.mode = mode});
       };
       const SimulationRun inverse = run(m, DriveMode::kInverse);
       ASSERT_TRUE(inverse.summary.ok()) << inverse.summary.message;
@@ -216,6 +222,38 @@ TEST(RoundJoints, MuJoCoFindsTheSameForces) {
       ASSERT_TRUE(forward.summary.ok()) << forward.summary.message;
       EXPECT_LT(Difference(reference.trace, forward.trace, m), 1e-5) << free;
     }
+  }
+}
+
+// Friction is limited about the axes of the joint's frame on its child, whichever body that is.
+TEST(RoundJoints, FrictionIsAboutTheAxesOfTheChildsFrame) {
+  const Mat3 R = RotRpy({0.5, -0.8, 1.1});
+  const Mechanism straight = Loaded({}, false);
+  const Motion motion = Wobble(straight);
+  const Trace of_straight = RunReference(straight, motion).trace;
+  for (const bool reversed : {false, true}) {
+    Mechanism m = straight;
+    Joint& ball = m.joints[static_cast<size_t>(m.FindJoint("round"))];
+    ball.X_PF.linear() *= R;
+    ball.X_CM.linear() *= R;
+    if (!reversed) {
+      EXPECT_LT(ErrorByHand(m, {}, false, R), 1e-11);
+    } else {
+      std::swap(ball.parent, ball.child);
+      std::swap(ball.X_PF, ball.X_CM);
+      ASSERT_TRUE(BuildSpanningTree(&m).ok());
+    }
+    const ReferenceRun reference = RunReference(m, motion);
+    ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
+    const SimulationRun run = Simulate(m, motion, Following(motion), {.mode = DriveMode::kInverse});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    EXPECT_LT(Difference(reference.trace, run.trace, m), 1e-10) << reversed;
+    EXPECT_GT(Difference(of_straight, run.trace, m), 1e-3) << reversed;
+    const SimulationRun forward =
+        Simulate(m, motion, Following(motion), {.mode = DriveMode::kPrescribedMotion});
+    ASSERT_TRUE(forward.summary.ok()) << forward.summary.message;
+    // It jumps within a step.
+    EXPECT_LT(Difference(reference.trace, forward.trace, m), 0.2) << reversed;
   }
 }
 

@@ -288,12 +288,14 @@ class MotionSearch {
       }
     };
     scaled(std::ldexp(1.0, -kHalvings));
-    double at_home = 0.0;
-    if (!Follow(std::numeric_limits<double>::infinity(), &at_home)) return motion_;
+    Course at_home;
+    if (!Follow({}, &at_home)) return motion_;
+    const Course limit{.quickest = kMostQuicker * at_home.quickest,
+                       .weakest = at_home.weakest / kMostQuicker};
     for (int i = 0; i <= kHalvings; ++i) {
       scaled(std::ldexp(1.0, -i));
-      double most = 0.0;
-      if (!Follow(kMostQuicker * at_home, &most)) continue;
+      Course course;
+      if (!Follow(limit, &course)) continue;
       motion_.found = true;
       break;
     }
@@ -302,6 +304,12 @@ class MotionSearch {
 
  private:
   static constexpr double kMostQuicker = 3.0;
+
+  // How fast the bodies get against the drives, and how weakly these hold them: near a pose where
+  // assemblies meet (bars in line) the motion may go on in either, at any speed.
+  struct Course {
+    double quickest = std::numeric_limits<double>::infinity(), weakest = 0.0;
+  };
 
   // Small enough for stretched knees; down, where they cannot stretch further.
   DriveStroke StrokeOfBase(const Coordinate& coordinate) const {
@@ -342,8 +350,9 @@ class MotionSearch {
     return motion;
   }
 
-  // False where the motion cannot be followed, leaves a range or gets quicker than `limit`.
-  bool Follow(double limit, double* quickest) const {
+  // False where the motion cannot be followed, leaves a range or goes beyond `limit`.
+  bool Follow(const Course& limit, Course* course) const {
+    *course = {.quickest = 0.0, .weakest = std::numeric_limits<double>::infinity()};
     const Motion motion = Commands();
     ReferenceSolver solver(m_, motion);
     ReferenceSample sample;
@@ -353,8 +362,10 @@ class MotionSearch {
       EvaluateMotion(motion, i * motion.sample_s, &command);
       if (!solver.Kinematics(command, &sample).ok()) return false;
       const double quick = Quickness(m_, sample, length_);
-      if (!std::isfinite(quick) || quick > limit) return false;
-      *quickest = std::max(*quickest, quick);
+      if (!std::isfinite(quick) || quick > limit.quickest) return false;
+      if (sample.control < limit.weakest) return false;
+      course->quickest = std::max(course->quickest, quick);
+      course->weakest = std::min(course->weakest, sample.control);
       if (!motion_.beyond_ranges && !IsWithinRanges(m_, sample.states.X_WB)) return false;
     }
     return true;

@@ -29,7 +29,6 @@ using tinyxml2::XMLElement;
 using enum SdfFate;
 
 constexpr const char* kWind = "wind drags and lifts the bodies";
-constexpr const char* kOfBall = "it exerts moments in the ball";
 constexpr const char* kOpen = "the loop that it closes is open";
 constexpr const char* kDriven = "the drives of the file move it";
 
@@ -125,9 +124,7 @@ const SdfRow kRows[] = {
     {"dynamics/spring_reference", "text", kTaken},
     {"dynamics/spring_stiffness", "text", kTaken},
     {"dynamics", "negative", kLeftOut, "it drives the joint", "", true},
-    {"ball", "damping", kLeftOut, kOfBall, "", true},
-    {"ball", "friction", kLeftOut, kOfBall, "", true},
-    {"ball", "spring_stiffness", kLeftOut, kOfBall, "", true},
+    {"ball", "spring_stiffness", kLeftOut, "it exerts moments in the ball", "", true},
     {"gearbox", "", kLeftOut, "the two bodies turn apart", "", true},
     {"axis/limit", "text", kTaken},
     {"axis2/limit", "text", kTaken},

@@ -433,7 +433,9 @@ class SdfImporter {
       if (from.Type() != sdf::JointType::CONTINUOUS) ReadLimits(axis, k, what, &joint);
       if (joint.kind != JointKind::kFixed) AddElements(axis, index, k, joint);
     }
-    if (joint.kind == JointKind::kSpherical) LoseOfBall(from, joint.name);
+    if (joint.kind == JointKind::kSpherical && from.Axis(0) != nullptr) {
+      AddOfBallJoint(*from.Axis(0), index, joint.name);
+    }
     if (element != nullptr && element->HasElement("physics")) {
       const sdf::ElementPtr physics = element->GetElement("physics");
       if (physics->HasElement("simbody") &&
@@ -509,13 +511,19 @@ class SdfImporter {
     }
   }
 
-  void LoseOfBall(const sdf::Joint& from, const std::string& name) {
-    const sdf::JointAxis* axis = from.Axis(0);
-    if (axis == nullptr) return;
-    for (const auto& [value, x] : {std::pair("damping", axis->Damping()),
-                                   {"friction", axis->Friction()},
-                                   {"spring_stiffness", axis->SpringStiffness()}}) {
-      if (x != 0.0) lost_[{"ball", value}].push_back(name);
+  // As Drake reads it: the moment −c ω. A spring of a ball has no coordinate.
+  void AddOfBallJoint(const sdf::JointAxis& axis, int index, const std::string& name) {
+    const auto add = [&](const char* suffix, const auto& law) {
+      AddOfBall({.name = name + suffix, .joint = index, .law = law}, JointKind::kSpherical,
+                &m_.elements);
+    };
+    const double damping = axis.Damping(), friction = axis.Friction();
+    if (damping > 0.0) add("_damping", DampingLaw{damping});
+    if (damping < 0.0) lost_[{"dynamics", "negative"}].push_back(name);
+    if (friction > 0.0) add("_friction", FrictionLaw{.coulomb = friction, .breakaway = friction});
+    if (axis.SpringStiffness() != 0.0) lost_[{"ball", "spring_stiffness"}].push_back(name);
+    if (!std::isfinite(damping) || !std::isfinite(friction)) {
+      Error("", fmt::format("joint '{}': its dynamics are not finite", name));
     }
   }
 

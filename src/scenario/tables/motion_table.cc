@@ -269,12 +269,14 @@ std::optional<Mat3> FromAxisAngle(const VecX& n) {
   return Eigen::AngleAxisd(n[3], axis.normalized()).toRotationMatrix();
 }
 
-const std::array<Convention, 4>& Conventions() {
-  static const std::array<Convention, 4> all = {
+constexpr size_t kRates = 4;  // of an inertial measurement unit
+const std::array<Convention, 5>& Conventions() {
+  static const std::array<Convention, 5> all = {
       Convention{"rpy", {"roll", "pitch", "yaw"}, "rad", FromRpy},
       Convention{"quaternion", {"qw", "qx", "qy", "qz"}, "1", FromQuaternion},
       Convention{"rotation_vector", {"rx", "ry", "rz"}, "rad", FromRotationVector},
-      Convention{"axis_angle", {"ax", "ay", "az", "angle"}, "1", FromAxisAngle}};
+      Convention{"axis_angle", {"ax", "ay", "az", "angle"}, "1", FromAxisAngle},
+      Convention{"rates", {"wx", "wy", "wz"}, "rad/s", nullptr}};
   return all;
 }
 
@@ -287,6 +289,138 @@ void Unwrap(std::vector<double>* angles) {
   }
 }
 
+// How the drift of an inertial measurement unit is taken off.
+struct DriftSettings {
+  enum class End { kFree, kRest, kReturn };
+  double rest_s = 0.0;
+  End end = End::kFree;
+};
+
+// (1), (2) in the header. Three splines each; of `turning` none where `R` gives the orientations.
+class DeadReckoning {
+ public:
+  DeadReckoning(const std::vector<double>& time_s, const Mat3& R_0, const Vec3& x_0,
+                const Vec3& gravity, const DriftSettings& drift)
+      : time_s_(time_s), R_0_(R_0), x_0_(x_0), g_(gravity), drift_(drift) {}
+
+  // Rows of rates, or orientations; rows of specific force. Rows of x and R.
+  void Run(const std::array<Piecewise, 3>* rates, const std::array<Piecewise, 3>& force,
+           std::vector<Mat3>* R, std::vector<Vec3>* x) {
+    TakeRest(rates, force);
+    if (rates != nullptr) {
+      Turn(*rates, R);
+      for (int pass = 0; pass < kPasses && drift_.end == DriftSettings::End::kReturn; ++pass) {
+        const Vec3 turned = LogRotation(R_0_.transpose() * R->back());
+        if (turned.norm() < kTurned) break;
+        b_w_ += turned / Span();
+        Turn(*rates, R);
+      }
+    }
+    Move(rates, force, *R, x);
+  }
+
+  [[nodiscard]] std::string Note(bool turned) const {
+    const auto three = [](const Vec3& v) {
+      return fmt::format("({:.3g}, {:.3g}, {:.3g})", v.x(), v.y(), v.z());
+    };
+    return fmt::format(
+        "from the home pose at rest by dead reckoning; taken off: {}the accelerometer's bias {} "
+        "m/s²{}",
+        turned ? "" : fmt::format("the gyroscope's bias {} rad/s, ", three(b_w_)), three(b_f_),
+        drift_.end == DriftSettings::End::kFree
+            ? fmt::format("; it ends with {:.3g} m/s, {:.3g} m away", v_end_.norm(), d_end_.norm())
+            : fmt::format(", and at the end {:.3g} m/s{}", v_end_.norm(),
+                          drift_.end == DriftSettings::End::kReturn
+                              ? fmt::format(" and {:.3g} m", d_end_.norm())
+                              : std::string()));
+  }
+
+ private:
+  static constexpr int kParts = 8;          // of the time between rows, even
+  static constexpr int kPasses = 20;        // until the end is turned as the start
+  static constexpr double kTurned = 1e-13;  // rad
+
+  [[nodiscard]] double Span() const { return time_s_.back() - time_s_.front(); }
+  static Vec3 At(const std::array<Piecewise, 3>& of, double t) {
+    return {Evaluate(of[0], t).value, Evaluate(of[1], t).value, Evaluate(of[2], t).value};
+  }
+
+  void TakeRest(const std::array<Piecewise, 3>* rates, const std::array<Piecewise, 3>& force) {
+    double rows = 0.0;
+    for (const double t : time_s_) {
+      if (!(drift_.rest_s > 0.0) || t > time_s_.front() + drift_.rest_s) break;
+      if (rates != nullptr) b_w_ += At(*rates, t);
+      b_f_ += At(force, t) + R_0_.transpose() * g_;
+      rows += 1.0;
+    }
+    if (rows == 0.0) return;
+    b_w_ /= rows;
+    b_f_ /= rows;
+  }
+
+  [[nodiscard]] Mat3 Turned(const std::array<Piecewise, 3>& rates, const Mat3& R, double t,
+                            double step) const {
+    const double inside = std::sqrt(3.0) / 6.0;
+    const Vec3 w_1 = At(rates, t + (0.5 - inside) * step) - b_w_;
+    const Vec3 w_2 = At(rates, t + (0.5 + inside) * step) - b_w_;
+    return R * ExpRotation(0.5 * step * (w_1 + w_2) + 0.5 * inside * step * step * w_1.cross(w_2));
+  }
+
+  void Turn(const std::array<Piecewise, 3>& rates, std::vector<Mat3>* R) const {
+    R->assign(1, R_0_);
+    for (size_t i = 0; i + 1 < time_s_.size(); ++i) {
+      const double step = (time_s_[i + 1] - time_s_[i]) / kParts;
+      Mat3 now = R->back();
+      for (int k = 0; k < kParts; ++k) now = Turned(rates, now, time_s_[i] + k * step, step);
+      R->push_back(now);
+    }
+  }
+
+  // Between given orientations the way is that of a constant rate.
+  void Move(const std::array<Piecewise, 3>* rates, const std::array<Piecewise, 3>& force,
+            const std::vector<Mat3>& R, std::vector<Vec3>* x) {
+    std::vector<Vec3> v(1, Vec3::Zero());
+    x->assign(1, x_0_);
+    for (size_t i = 0; i + 1 < time_s_.size(); ++i) {
+      const double step = (time_s_[i + 1] - time_s_[i]) / kParts;
+      const Vec3 way = LogRotation(R[i].transpose() * R[i + 1]) / kParts;
+      std::array<Vec3, kParts + 1> a;
+      Mat3 now = R[i];
+      for (int k = 0; k <= kParts; ++k) {
+        const double t = time_s_[i] + k * step;
+        a.at(static_cast<size_t>(k)) = now * (At(force, t) - b_f_) + g_;
+        if (k == kParts) break;
+        now = rates != nullptr ? Turned(*rates, now, t, step) : Mat3(now * ExpRotation(way));
+      }
+      Vec3 speed = v.back(), place = x->back();
+      for (size_t k = 0; k < kParts; k += 2) {
+        place += 2.0 * step * speed + 2.0 * step * step / 3.0 * (a.at(k) + 2.0 * a.at(k + 1));
+        speed += step / 3.0 * (a.at(k) + 4.0 * a.at(k + 1) + a.at(k + 2));
+      }
+      v.push_back(speed);
+      x->push_back(place);
+    }
+    v_end_ = v.back();
+    d_end_ = x->back() - x_0_;
+    if (drift_.end == DriftSettings::End::kFree) return;
+    const double T = Span();
+    const Vec3 beta = drift_.end == DriftSettings::End::kRest
+                          ? Vec3(Vec3::Zero())
+                          : Vec3((0.5 * T * v_end_ - d_end_) * 6.0 / (T * T * T));
+    const Vec3 alpha = v_end_ / T - beta * T;
+    for (size_t i = 0; i < x->size(); ++i) {
+      const double t = time_s_[i] - time_s_.front();
+      (*x)[i] -= t * t * (alpha / 2.0 + beta * t / 3.0);
+    }
+  }
+
+  const std::vector<double>& time_s_;
+  const Mat3 R_0_;
+  const Vec3 x_0_, g_;
+  const DriftSettings drift_;
+  Vec3 b_w_ = Vec3::Zero(), b_f_ = Vec3::Zero(), v_end_ = Vec3::Zero(), d_end_ = Vec3::Zero();
+};
+
 class PoseLoader {
  public:
   PoseLoader(ValueReader* values, const YamlNode& node, const Mechanism& mechanism)
@@ -297,7 +431,7 @@ class PoseLoader {
     Read();
     if (settings_.file.empty() || yaml().diagnostics().findings().size() > found) return {};
     source_ = LoadTable(settings_, mechanism_, &yaml(), files);
-    if (source_ == nullptr || !CheckRows() || !TurnRows() || !Finish()) return {};
+    if (source_ == nullptr || !CheckRows() || !TakeRows() || !Finish()) return {};
     return std::move(pose_);
   }
 
@@ -306,17 +440,20 @@ class PoseLoader {
 
   void Read() {
     settings_.path = "motion.pose_table";
-    std::vector<std::string> keys = {"output", "angles",    "columns", "time",
-                                     "use",    "smoothing", "periodic"};
+    std::vector<std::string> keys = {"output", "angles",    "columns",  "time",
+                                     "use",    "smoothing", "periodic", "imu"};
     keys.insert(keys.end(), kTableSourceKeys.begin(), kTableSourceKeys.end());
     const YamlMap map(&yaml(), &node_, settings_.path, keys);
     if (!map.valid()) return;
     ReadTableSource(&values_, map, &settings_);
     if (const YamlNode* output = map.Required("output")) ReadOutput(*output, map.PathOf("output"));
+    if (const YamlNode* imu = map.Find("imu")) ReadImu(*imu, map.PathOf("imu"));
     if (const YamlNode* angles = map.Find("angles")) {
-      const auto choice = yaml().Choice(*angles, map.PathOf("angles"),
-                                        {"rpy", "quaternion", "rotation_vector", "axis_angle"});
+      std::vector<std::string> words = {"rpy", "quaternion", "rotation_vector", "axis_angle"};
+      if (imu_) words[3] = "rates";  // columns ax, ay, az are its specific force
+      const auto choice = yaml().Choice(*angles, map.PathOf("angles"), words);
       convention_ = &Conventions()[static_cast<size_t>(choice.value_or(0))];
+      if (imu_ && choice == 3) convention_ = &Conventions()[kRates];
     }
     ReadColumns(map);
     if (const YamlNode* use = map.Find("use")) ReadUse(*use, map.PathOf("use"));
@@ -327,6 +464,25 @@ class PoseLoader {
     if (const YamlNode* periodic = map.Find("periodic")) {
       periodic_ = yaml().Flag(*periodic, map.PathOf("periodic")).value_or(false);
     }
+  }
+
+  void ReadImu(const YamlNode& node, const std::string& path) {
+    const YamlMap map(&yaml(), &node, path, {"rest_s", "end"});
+    imu_.emplace();
+    convention_ = &Conventions()[kRates];
+    if (const YamlNode* rest = map.Find("rest_s")) {
+      imu_->rest_s = values_.Positive(*rest, map.PathOf("rest_s")).value_or(0.0);
+    }
+    if (const YamlNode* end = map.Find("end")) {
+      const auto choice = yaml().Choice(*end, map.PathOf("end"), {"free", "rest", "return"});
+      imu_->end = static_cast<DriftSettings::End>(choice.value_or(0));
+    }
+    if (pose_.output < 0 ||
+        mechanism_.outputs[static_cast<size_t>(pose_.output)].reference_body == 0) {
+      return;
+    }
+    yaml().Error(node, path + ": the output's pose is one in a body that moves, not in the world",
+                 "take an output whose pose is one in the world");
   }
 
   void ReadOutput(const YamlNode& node, const std::string& path) {
@@ -343,12 +499,14 @@ class PoseLoader {
   // Three lengths, the orientation's columns, and the time where it is stated.
   void ReadColumns(const YamlMap& map) {
     std::vector<std::string> names = {"x", "y", "z"};
+    if (imu_) names = {"ax", "ay", "az"};
     names.insert(names.end(), convention_->columns.begin(), convention_->columns.end());
     const YamlMap columns(&yaml(), map.Find("columns"), map.PathOf("columns"), names);
     for (const std::string& name : names) {
       Channel channel;
       channel.name = name;
-      channel.unit = name.size() == 1 ? "m" : name == "angle" ? "rad" : convention_->unit;
+      channel.unit = name == "angle" ? "rad" : convention_->unit;
+      if (settings_.signals.size() < 3) channel.unit = imu_ ? "m/s^2" : "m";
       settings_.signals.push_back(std::move(channel));
       AddColumn(name, columns.Find(name), columns.PathOf(name));
     }
@@ -384,12 +542,61 @@ class PoseLoader {
     return false;
   }
 
+  bool TakeRows() {
+    if (!imu_) return TurnRows(source_->values);
+    // Orientations and specific forces of the rows, then poses of the rows.
+    const std::vector<double> time_s = TrueTimes(*source_);
+    const MatX& values = source_->values;
+    const auto splines = [&](Eigen::Index first) {
+      std::array<Piecewise, 3> of;
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        SplineRows rows;
+        rows.time_s = time_s;
+        const VecX column = values.col(first + c);
+        rows.values.assign(column.begin(), column.end());
+        of.at(static_cast<size_t>(c)) = Interpolated(rows);
+      }
+      return of;
+    };
+    const bool rates = convention_->rotation == nullptr;
+    std::vector<Mat3> R;
+    for (Eigen::Index i = 0; i < values.rows() && !rates; ++i) {
+      const auto turned = convention_->rotation(values.row(i).tail(values.cols() - 3).transpose());
+      if (!turned) return RefuseRow(i, false);
+      R.push_back(*turned);
+    }
+    const Output& output = mechanism_.outputs[static_cast<size_t>(pose_.output)];
+    Vec6 home;
+    for (int c = 0; c < 6; ++c) {
+      home[c] = HomeValue(mechanism_, {Coordinate::Kind::kOutput, pose_.output, c});
+    }
+    const Vec3 gravity = output.X_RbR.linear().transpose() * mechanism_.gravity_W;
+    DeadReckoning reckoning(time_s, rates ? RotRpy(home.tail<3>()) : R.front(), home.head<3>(),
+                            gravity, *imu_);
+    std::vector<Vec3> x;
+    const std::array<Piecewise, 3> force = splines(0);
+    if (rates) {
+      const std::array<Piecewise, 3> turning = splines(3);
+      reckoning.Run(&turning, force, &R, &x);
+    } else {
+      reckoning.Run(nullptr, force, &R, &x);
+    }
+    note_ = reckoning.Note(!rates);
+    MatX poses(values.rows(), 6);
+    for (Eigen::Index i = 0; i < poses.rows(); ++i) {
+      const auto row = static_cast<size_t>(i);
+      poses.row(i) << x[row].transpose(), RpyOf(R[row]).transpose();
+    }
+    convention_ = Conventions().data();
+    return TurnRows(poses);
+  }
+
   // Every row's orientation as roll, pitch and yaw.
-  bool TurnRows() {
-    const auto n = source_->values.rows();
+  bool TurnRows(const MatX& values) {
+    const auto n = values.rows();
     for (auto& component : rows_) component.resize(static_cast<size_t>(n));
     for (Eigen::Index i = 0; i < n; ++i) {
-      const VecX row = source_->values.row(i).transpose();
+      const VecX row = values.row(i).transpose();
       const auto R = convention_->rotation(row.tail(row.size() - 3));
       const Vec3 rpy = R ? RpyOf(*R) : Vec3::Zero();
       if (!R || std::abs(rpy.y()) > kSteepest) return RefuseRow(i, R.has_value());
@@ -423,13 +630,23 @@ class PoseLoader {
       rows.time_s = TrueTimes(*source_);
       rows.values = rows_[static_cast<size_t>(c)];
       const MatX column = Eigen::Map<const VecX>(rows.values.data(), n);
-      const double step = c < 3 ? source_->steps.col(c).maxCoeff() : 0.0;
+      const double step = c < 3 && !imu_ ? source_->steps.col(c).maxCoeff() : 0.0;
       rows.deviation = std::max(EstimateNoise(rows.time_s, column)[0], step / std::sqrt(12.0));
+      if (imu_ && rows.deviation < RoundOff(c)) rows.deviation = 0.0;
       pose_.components.push_back({c, Described(c, rows)});
       const RowsPlace place{&yaml(), settings_.place, settings_.path, settings_.csv, step};
       if (!MakeSplines(place, rows, &pose_.components.back().table)) return false;
     }
     return true;
+  }
+
+  // Of a dead reckoning: of all lengths, or of a radian.
+  [[nodiscard]] double RoundOff(int c) const {
+    double size = c < 3 ? 0.0 : 1.0;
+    for (size_t k = 0; k < 3 && c < 3; ++k) {
+      for (const double x : rows_.at(k)) size = std::max(size, std::abs(x));
+    }
+    return 8.0 * kEps * size;
   }
 
   [[nodiscard]] MotionTable Described(int c, const SplineRows& rows) const {
@@ -438,7 +655,7 @@ class PoseLoader {
     const auto k = static_cast<size_t>(c);
     table.name = output.name + "." + kPoseComponents[k];
     table.file = source_->name;
-    table.column = c < 3 ? source_->columns[k].heading : convention_->word;
+    table.column = imu_ ? "imu" : c < 3 ? source_->columns[k].heading : convention_->word;
     table.unit = c < 3 ? "m" : "rad";
     table.rows = rows.time_s.size();
     table.from_s = rows.time_s.front();
@@ -449,12 +666,15 @@ class PoseLoader {
     table.smoothing = smoothing_;
     table.deviation = rows.deviation;
     if (pose_.components.empty()) table.notes = source_->notes;
+    if (pose_.components.empty() && imu_) table.notes.push_back(note_);
     return table;
   }
 
   ValueReader& values_;
   const YamlNode& node_;
   const Mechanism& mechanism_;
+  std::optional<DriftSettings> imu_;
+  std::string note_;
   TableSettings settings_;
   const Convention* convention_ = Conventions().data();
   std::vector<int> use_ = {0, 1, 2, 3, 4, 5};

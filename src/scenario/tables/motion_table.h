@@ -41,6 +41,19 @@ void CheckCover(const MotionTable& table, const YamlNode& node, const std::strin
 //
 // Orientations of every row become roll, pitch and yaw (R = Rz(yaw) Ry(pitch) Rx(roll)), without
 // jumps of whole turns; each component is then a table of its own (motion_table.h).
+//
+//   pose_table: {output: base, csv: imu.csv, imu: {rest_s: 0.5, end: return}}
+//
+// What an inertial measurement unit at the output's frame shows, angular velocity ω (or an
+// orientation) and specific force f in its axes, becomes a pose by
+//
+//   Ṙ = R [ω − b_ω]×                                                                          (1)
+//   v̇ = R (f − b_f) + g − c(t),  ẋ = v                                                        (2)
+//
+// from the output's home pose at rest. Biases b_ω, b_f: what it shows in its first rest_s, where it
+// rests at home. c = α + β t: at the end it is at rest (`end: rest`, β = 0), or at rest where it
+// started (`return`, which takes a constant b_ω more); nothing with `end: free`. What is taken off
+// is a note of the table. (1) by Magnus' expansion of fourth order, (2) by Simpson's rule.
 
 /// A commanded component of an output's pose.
 struct PoseComponent {

@@ -135,6 +135,11 @@ void AddHolding(const ConstraintSystem& system, size_t e, ElementMotion* at) {
   if (at->rests) at->held = system.HeldForce(e);
 }
 
+// The first of the three velocities of a ball's or a free joint's rotation.
+int FirstTurn(const mjModel& m, int joint) {
+  return m.jnt_dofadr[joint] + (m.jnt_type[joint] == mjJNT_FREE ? 3 : 0);
+}
+
 // The coordinate's gradient, of a tendon.
 ConstVecX TendonGradient(const ConstraintSystem& system, const ElementPlace& place) {
   return {system.data()->ten_J + place.tendon * system.nv(), system.nv()};
@@ -170,12 +175,20 @@ double PowerSum(const std::vector<double>& c, double x) {
 
 }  // namespace
 
+Vec3 TurnedAxis(const mjData& d, const ElementPlace& place) {
+  return PoseOf(d, place.turned).linear() * place.axis_C;
+}
+
 ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
   const ElementPlace& place = system.engine().elements[element];
   const mjData& d = *system.data();
   if (place.bushing_child >= 0) return BushingMotionOf(system, element);
   ElementMotion at;
-  if (place.tendon < 0) {
+  if (place.turned >= 0) {
+    // The axis turns with its body, and what it turns by is at right angles to the rate itself.
+    const VecX u = ElementGradient(system, element);
+    at = {kNan, u.dot(ConstVecX(d.qvel, system.nv())), u.dot(ConstVecX(d.qacc, system.nv()))};
+  } else if (place.tendon < 0) {
     at = {d.qpos[place.qpos], d.qvel[place.dof], d.qacc[place.dof]};
   } else {
     const ConstVecX u = TendonGradient(system, place);
@@ -193,6 +206,14 @@ VecX ElementGradient(const ConstraintSystem& system, size_t element) {
   const ElementPlace& place = system.engine().elements[element];
   if (place.bushing_child >= 0) return BushingGradient(system, element);
   if (place.tendon >= 0) return TendonGradient(system, place);
+  if (place.turned >= 0) {
+    const mjModel& m = *system.engine().m;
+    const Mat3 R_WO = PoseOf(*system.data(), m.jnt_bodyid[place.joint]).linear();
+    VecX gradient = VecX::Zero(system.nv());
+    gradient.segment<3>(FirstTurn(m, place.joint)) =
+        R_WO.transpose() * TurnedAxis(*system.data(), place);
+    return gradient;
+  }
   return VecX::Unit(system.nv(), place.dof);
 }
 
@@ -263,13 +284,12 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
   const bool released = motion.free() || IsReleased(engine);
   for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
-    if (HasFriction(element) && engine.elements[e].turned) {
-      return FrictionUnsupported(engine, e,
-                                 "MuJoCo's ball has other axes than the joint's frame on its "
-                                 "child, and friction is limited about each by itself");
-    }
     if (released && HasFriction(element)) {
-      const std::string why = FrictionTrouble(element, drives, own_events);
+      const std::string why = engine.elements[e].turned >= 0
+                                  ? "MuJoCo's ball has other axes than the joint's frame on its "
+                                    "child, and its frictionloss is limited about each by itself; "
+                                    "with all drives commanded it is simulated"
+                                  : FrictionTrouble(element, drives, own_events);
       if (!why.empty()) return FrictionUnsupported(engine, e, why);
     }
     if (released && IsGyroscopic(element) && (!own_events || element.drive >= 0)) {
@@ -326,7 +346,7 @@ void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceler
     }
     double force = ForceOf(elements[e], at);
     if (place.armature) force += std::get<RotorLaw>(elements[e].law).reflected() * at.acceleration;
-    if (place.dof >= 0) {
+    if (place.dof >= 0 && place.turned < 0) {
       qfrc[place.dof] += force;
     } else {
       Eigen::Map<VecX>(qfrc, system.nv()) += force * ElementGradient(system, e);

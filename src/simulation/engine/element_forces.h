@@ -36,6 +36,9 @@ struct BushingLine {
 };
 /// Of an element of a bushing at the data's position.
 [[nodiscard]] BushingLine BushingLineOf(const ConstraintSystem& system, size_t element);
+/// In the world: ElementPlace::axis_C.
+[[nodiscard]] Vec3 TurnedAxis(const mjData& d, const ElementPlace& place);
+
 /// dq/dq̇ of MuJoCo's velocities (nv).
 [[nodiscard]] VecX BushingGradient(const ConstraintSystem& system, size_t element);
 /// Position and rate at the data's qpos and qvel; the acceleration is NaN.

@@ -109,8 +109,8 @@ void FindElementBodies(const EngineModel& engine, const ForceElement& element,
 
 // MuJoCo's velocities of a ball are those of its outboard body, seen from the inboard one, about
 // axes of the outboard one: where that is not the child, or M's axes are not its own, the three
-// elements of a rotation still are these three together, but for friction. A free joint's first
-// three are those of the body's origin along the world's axes.
+// elements of a rotation still are these three together, but for friction, which is limited about
+// each axis of M. A free joint's first three are those of the body's origin along the world's axes.
 bool FindOfBallOrFree(const EngineModel& engine, const ForceElement& element, ElementPlace* place) {
   const mjModel& m = *engine.m;
   const Joint& joint = engine.mechanism->joints[static_cast<size_t>(element.joint)];
@@ -126,10 +126,15 @@ bool FindOfBallOrFree(const EngineModel& engine, const ForceElement& element, El
   place->qpos = m.jnt_qposadr[*round];  // has no meaning
   const auto outboard = std::ranges::find(engine.body_id, m.jnt_bodyid[*round]);
   const auto at = static_cast<size_t>(outboard - engine.body_id.begin());
-  place->turned =
-      engine.plan.bodies[at].body != joint.child || !joint.X_CM.linear().isIdentity(0.0);
-  if (IsOfBall(joint.kind, element.coordinate)) return true;
-  return free && !place->turned && joint.X_PF.linear().isIdentity(0.0) &&
+  const double sense = engine.plan.bodies[at].body == joint.child ? 1.0 : -1.0;
+  const bool turned = sense < 0.0 || !joint.X_CM.linear().isIdentity(0.0);
+  if (IsOfBall(joint.kind, element.coordinate)) {
+    if (!turned || !HasFriction(element)) return true;
+    place->turned = EngineBody(engine, joint.child);
+    place->axis_C = sense * joint.X_CM.linear().col(BallAxis(joint.kind, element.coordinate));
+    return true;
+  }
+  return free && !turned && joint.X_PF.linear().isIdentity(0.0) &&
          joint.X_CM.translation().isZero(0.0);
 }
 

@@ -34,8 +34,10 @@ struct ElementPlace {
   int bushing_parent = -1, bushing_child = -1;
   int carrier = -1;       ///< MuJoCo's body whose turning a rotor feels
   bool armature = false;  ///< MuJoCo has such a rotor's inertia along its coordinate
-  bool turned = false;    ///< of a ball: MuJoCo's axes are not M's
-  bool led = false;       ///< commands move the coordinate, loops included, where others are free
+  int turned = -1;        ///< MuJoCo's body that carries M, of a ball's friction about axes of M
+                          ///< that are not MuJoCo's
+  Vec3 axis_C = Vec3::Zero();  ///< there: M's axis on it, reversed where that body is inboard
+  bool led = false;  ///< commands move the coordinate, loops included, where others are free
 };
 
 struct EngineModel;

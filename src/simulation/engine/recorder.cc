@@ -581,7 +581,9 @@ Vec6 Recorder::AxisOfRound(const ElementPlace& place) const {
   const int k = place.dof - m.jnt_dofadr[place.joint];
   if (m.jnt_type[place.joint] == mjJNT_FREE && k < 3) return Vec6::Unit(3 + k);
   Vec6 axis = Vec6::Zero();
-  axis.head<3>() = PoseOf(*system_->data(), m.jnt_bodyid[place.joint]).linear().col(k % 3);
+  axis.head<3>() = place.turned >= 0
+                       ? TurnedAxis(*system_->data(), place)
+                       : PoseOf(*system_->data(), m.jnt_bodyid[place.joint]).linear().col(k % 3);
   return axis;
 }
 

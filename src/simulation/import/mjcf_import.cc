@@ -59,8 +59,13 @@ void AddJoint(int j, const Ends& ends, const Pose& X_PB, MjcfImport* in) {
       if (in->m.jnt_limited[j] != 0 && !in->LimitsAreOff()) {
         // Its limit pushes from the margin on.
         const double margin = in->m.jnt_margin[j];
-        joint.range[0] = {in->m.jnt_range[2 * j] - in->m.qpos0[at] + margin,
-                          in->m.jnt_range[2 * j + 1] - in->m.qpos0[at] - margin};
+        const CoordinateRange range{in->m.jnt_range[2 * j] - in->m.qpos0[at] + margin,
+                                    in->m.jnt_range[2 * j + 1] - in->m.qpos0[at] - margin};
+        if (range.lower < range.upper) {
+          joint.range[0] = range;
+        } else {
+          in->without_room.push_back(joint.name);
+        }
       }
       if (in->m.qpos0[at] != 0.0) in->shifted.push_back(joint.name);
       if (in->m.nkey == 0) StartInside(&joint, in);
@@ -74,8 +79,13 @@ void AddJoint(int j, const Ends& ends, const Pose& X_PB, MjcfImport* in) {
       joint.home = {rpy.x(), rpy.y(), rpy.z(), 0, 0, 0};
       if (in->m.jnt_limited[j] != 0 && !in->LimitsAreOff()) {
         // MuJoCo takes the larger of both numbers as the largest angle of rotation.
-        joint.max_rotation =
+        const double most =
             std::max(in->m.jnt_range[2 * j], in->m.jnt_range[2 * j + 1]) - in->m.jnt_margin[j];
+        if (most > 0.0) {
+          joint.max_rotation = most;
+        } else {
+          in->without_room.push_back(joint.name);
+        }
       }
       break;
     }
@@ -753,6 +763,7 @@ void MjcfImport::LeaveOut(const char* element, const char* attribute, const std:
 void WarnWhatIsLost(MjcfImport* in) {
   LeaveOutFluid(in);
   LeaveOutOf("any joint", "damping", "the negative damping", in->driving, in);
+  LeaveOutOf("limit without room", "range", "the limit", in->without_room, in);
   LeaveOutTendons(in);
   if (!in->held.empty()) {
     in->LeaveOut("body/freejoint", "", "the free joint of " + Joined(in->held, kMost));

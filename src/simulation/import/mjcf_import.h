@@ -53,11 +53,12 @@ struct MjcfImport {
 
   // What the findings at the end report.
   std::vector<std::string> held = {}, carried = {}, floating = {}, shifted = {}, moved = {};
-  std::vector<std::string> driving = {};  ///< joints whose damping is negative
-  std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
-  std::set<int> driven_tendons = {};      ///< between two sites, with a drive
-  std::set<int> sprung_tendons = {};      ///< between two sites, as springs
-  bool touching = false;                  ///< geoms would touch each other
+  std::vector<std::string> driving = {};       ///< joints whose damping is negative
+  std::vector<std::string> without_room = {};  ///< joints whose limit allows no motion
+  std::set<int> coupling_tendons = {};         ///< that are nothing but the sum in a coupling
+  std::set<int> driven_tendons = {};           ///< between two sites, with a drive
+  std::set<int> sprung_tendons = {};           ///< between two sites, as springs
+  bool touching = false;                       ///< geoms would touch each other
 
   void Say(const std::string& text, const std::string& hint = "") const {
     diagnostics->Add({Severity::kWarning, file, 0, 0, text, hint});

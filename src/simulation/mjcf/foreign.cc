@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -336,31 +337,66 @@ struct ForeignMjcf::Impl {
     return compiler;
   }
 
-  // Since MuJoCo 3.0 a range holds unless the file says otherwise.
+  // Since MuJoCo 3.0 a range holds unless the file says otherwise, and since 3.0 one without room
+  // (lower ≥ upper, "0 0") is none.
   void LetRangesHold() {
+    constexpr std::pair<const char*, const char*> kLimits[] = {{"range", "limited"},
+                                                               {"ctrlrange", "ctrllimited"},
+                                                               {"forcerange", "forcelimited"},
+                                                               {"actrange", "actlimited"}};
     int open = 0, line = 0;
-    bool of_actuators = false;  // no force: their motion is commanded
+    bool any = false;
     ForEach(root(), [&](XMLElement* e) {
-      for (const auto& [range, limited] : {std::pair("ctrlrange", "ctrllimited"),
-                                           {"forcerange", "forcelimited"},
-                                           {"actrange", "actlimited"}}) {
-        if (e->Attribute(range) != nullptr && e->Attribute(limited) == nullptr) of_actuators = true;
+      for (const auto& [attribute, limited] : kLimits) {
+        any = any || e->Attribute(attribute) != nullptr;
+        const bool of_actuator = attribute != kLimits[0].first;  // muscles have another `range`
+        const XMLElement* parent = e == root() ? e : e->Parent()->ToElement();
+        if (IsBelowDefault(e) || of_actuator != IsTag(parent, "actuator")) continue;
+        const char* range = Inherited(e, attribute);
+        if (range == nullptr || !IsAuto(Inherited(e, limited))) continue;
+        if (!HasRoom(range)) {
+          e->SetAttribute(limited, "false");
+        } else if (!of_actuator && open++ == 0) {  // no force: actuators' motion is commanded
+          line = e->GetLineNum();
+        }
       }
-      if (e->Attribute("range") == nullptr || e->Attribute("limited") != nullptr) return;
-      if (open++ == 0) line = e->GetLineNum();
     });
-    bool stated = false;
-    for (XMLElement* e = root()->FirstChildElement("compiler"); e != nullptr;
-         e = e->NextSiblingElement("compiler")) {
-      stated = stated || e->Attribute("autolimits") != nullptr;
-    }
-    if (stated || (open == 0 && !of_actuators)) return;
+    if (StatesAutolimits() || !any) return;
     Compiler()->SetAttribute("autolimits", "true");
     if (open == 0) return;
     Add(Severity::kWarning, line,
         fmt::format("{} range{} without `limited` hold{}, as since MuJoCo 3", open,
                     open == 1 ? "" : "s", open == 1 ? "s" : ""),
         "<compiler autolimits=\"false\"/> if they should not");
+  }
+
+  static bool IsBelowDefault(const XMLElement* e) {
+    for (const tinyxml2::XMLNode* up = e->Parent(); up != nullptr; up = up->Parent()) {
+      if (up->ToElement() != nullptr && IsTag(up->ToElement(), "default")) return true;
+    }
+    return false;
+  }
+
+  static bool IsAuto(const char* limited) {
+    return limited == nullptr || std::string_view(limited) == "auto";
+  }
+
+  // As MuJoCo reads it: what is not there is 0. What is no number is for its reader to judge.
+  static bool HasRoom(const char* range) {
+    double lower = 0.0, upper = 0.0;
+    std::istringstream text(range);
+    text >> lower;
+    if (text.fail()) return true;
+    text >> upper;
+    return lower < upper || (text.fail() && !text.eof());
+  }
+
+  bool StatesAutolimits() {
+    for (const XMLElement* e = root()->FirstChildElement("compiler"); e != nullptr;
+         e = e->NextSiblingElement("compiler")) {
+      if (e->Attribute("autolimits") != nullptr) return true;
+    }
+    return false;
   }
 
   // What MuJoCo 3 says of bodies and joints and 2.2 has no word for goes through its compiler as
@@ -407,13 +443,18 @@ struct ForeignMjcf::Impl {
   }
 
   // In the order of UserNumber.
-  static std::string JointNumbers(const XMLElement* joint) {
+  std::string JointNumbers(const XMLElement* joint) {
     const auto is = [joint](const char* attribute, std::string_view value) {
       const char* text = Inherited(joint, attribute);
       return text != nullptr && text == value;
     };
     const char* range = Inherited(joint, "actuatorfrcrange");
-    const bool limited = range != nullptr && !is("actuatorfrclimited", "false");
+    const bool limited = range != nullptr && HasRoom(range) && !is("actuatorfrclimited", "false");
+    if (is("actuatorfrclimited", "true") && !limited) {
+      Add(Severity::kError, joint->GetLineNum(),
+          "actuatorfrcrange is limited, but its first number is not below its second",
+          "MuJoCo 3 refuses it; actuatorfrclimited=\"false\" is no limit");
+    }
     return fmt::format("{} {} {}", is("actuatorgravcomp", "true") ? 1 : 0, limited ? 1 : 0,
                        limited ? range : "0 0");
   }

@@ -90,6 +90,7 @@ const ForeignRow kRows[] = {
                    "springref armature damping frictionloss actuatorgravcomp actuatorfrclimited "
                    "actuatorfrcrange", kTaken},
     {"body/joint", "group solreflimit solimplimit solreffriction solimpfriction user", kNoForce},
+    {"limit without room", "range", kLeftOut, "it pushes back at every pose", "", true},
     {"any joint", "damping", kLeftOut, "a negative damper drives the joint", "0", true},
     {"stiffness", "2nd", kLeftOut, kMoreThanLinear, "0"},
     {"springlength", "2nd", kLeftOut, "the tendon pulls outside a band of lengths"},

@@ -640,11 +640,28 @@ TEST_F(SolverRows, DoNotDependOnThreads) {
   }
 }
 
-// After the first samples of a block, whatever the joints, force elements and couplings are.
+// Weights that the drives' own forces carry.
+constexpr const char* kLifted = R"(name: lifted
+bodies:
+  cart: {mass: 3, com: [0.1, 0, 0], inertia: [0.1, 0.1, 0.1], gravity_compensation: 0.5}
+  arm: {mass: 2, com: [0.2, 0, 0], inertia: [0.1, 0.1, 0.1], gravity_compensation: 1}
+joints:
+  slide: {kind: prismatic, parent: world, child: cart, axis: z}
+  hinge: {kind: revolute, parent: cart, child: arm, axis: y}
+drives:
+  lift: {kind: joint, joint: slide, gravity_compensation: true}
+  turn: {kind: joint, joint: hinge, gravity_compensation: true}
+)";
+
+// After the first samples of a block, whatever the joints, force elements, couplings and
+// compensations are; "" is kLifted.
 class SolverAllocations : public testing::TestWithParam<std::string> {};
 
 TEST_P(SolverAllocations, OfRowsDoNotGrowWithTheirNumber) {
-  const Model model = Model::Load(ModelPath(GetParam()));
+  const test::TestFolder folder("solver_allocations");
+  const std::string& name = GetParam();
+  const Model model =
+      Model::Load(name.empty() ? folder.Write("lifted.yaml", kLifted) : ModelPath(name));
   const Solver solver(model, IndependentOf(model.mechanism()));
   const Eigen::Index n = solver.size(), rows = Solver::kBlock;
   Random random(5);
@@ -668,7 +685,7 @@ TEST_P(SolverAllocations, OfRowsDoNotGrowWithTheirNumber) {
 INSTANTIATE_TEST_SUITE_P(Each, SolverAllocations,
                          testing::Values("stewart", "stabilizing_platform", "spr_tripod",
                                          "scara_robot", "cabin_robot", "redundant_five_bar",
-                                         "geared_press", "rubbing_five_bar", "bushed_linkage"));
+                                         "geared_press", "rubbing_five_bar", "bushed_linkage", ""));
 
 TEST_F(SolverRows, NameTheOnesThatFail) {
   MatX expected, forces;

@@ -416,6 +416,102 @@ TEST_F(Feet, WhatFeetShareIsMarkedAndWhatTheyBearTogetherIsNot) {
   EXPECT_EQ(together, 1U);
 }
 
+// On two lines at different heights everything happens in one plane: with T on the upper line the
+// other forces follow, and one search over T gives the least friction.
+class Stairs : public Feet {
+ protected:
+  static constexpr double kDepth = 0.4, kStep = 0.15, kMiddle = 0.2, kAmplitude = 0.1;
+
+  [[nodiscard]] static std::string Model(double friction, double com_x) {
+    return fmt::format(R"(
+name: stairs
+bodies:
+  top: {{mass: 12, com: [{}, 0, 0.6], inertia: [1, 1, 1], frames: {{a: [0, 0, 0], b: [-{}, 0, {}]}}}}
+  load: {{mass: 3, com: [0, 0, 0.5], inertia: [0.1, 0.1, 0.1]}}
+joints:
+  float: {{kind: free, parent: world, child: top}}
+  slide: {{kind: prismatic, parent: top, child: load, axis: x}}
+drives: {{x: {{kind: joint, joint: slide}}}}
+contacts:
+  a: {{on: top.a, kind: line, axis: [0, 1, 0], length: 0.5, friction: {}}}
+  b: {{on: top.b, kind: line, axis: [0, 1, 0], length: 0.5, friction: {}}}
+)",
+                       com_x, kDepth, kStep, friction, friction);
+  }
+  [[nodiscard]] static std::string Commands(double period_s) {
+    return fmt::format("{{x: {{sine: {{amplitude: {}, period_s: {}}}}}}}", kAmplitude, period_s);
+  }
+  // Needed at t, infinite where the lines would have to pull.
+  [[nodiscard]] static double NeededByHand(double t, double period_s, double com_x) {
+    const double omega = 2.0 * std::numbers::pi / period_s;
+    const double x = kAmplitude * std::sin(omega * t);
+    const double F = -3.0 * omega * omega * x, N = 15.0 * kGravity;
+    // About a's line: M = Σ z F_x − x F_z.
+    const double M = 0.5 * F - x * 3.0 * kGravity - com_x * 12.0 * kGravity;
+    const auto needed = [&](double T) {
+      const double N_b = (M - kStep * T) / kDepth;
+      return std::max(std::abs(T) / N_b, std::abs(F - T) / (N - N_b));
+    };
+    // Both push between these; the larger of two such quotients has one minimum.
+    double low = (M - kDepth * N) / kStep + 1e-6, high = M / kStep - 1e-6;
+    for (int i = 0; i < 200; ++i) {
+      const double third = (high - low) / 3.0;
+      if (needed(low + third) < needed(high - third)) {
+        high -= third;
+      } else {
+        low += third;
+      }
+    }
+    return needed(low);
+  }
+};
+
+TEST_F(Stairs, FeetAtDifferentHeightsAreJudgedTogether) {
+  for (const double period_s : {1.0, 0.6}) {
+    double most = 0.0;
+    for (int i = 0; i <= 80; ++i) {
+      most = std::max(most, NeededByHand(0.01 * i, period_s, -kMiddle));
+    }
+    ASSERT_TRUE(std::isfinite(most));
+    for (const double share : {0.99, 1.01}) {
+      const RunOutcome run = Run(Model(share * most, -kMiddle), Commands(period_s));
+      ASSERT_TRUE(run.report) << run.diagnostics.Text();
+      EXPECT_EQ(run.exit_code, 0) << ToTable(*run.report, {});
+      for (const char* witness : {"reference", "simulated"}) {
+        const ContactLoad* all = LoadOf(run, witness, "");
+        ASSERT_NE(all, nullptr) << witness;
+        const ContactLoad::Use* fall = all->Find(Limit::kFall);
+        ASSERT_NE(fall, nullptr);
+        EXPECT_GE(fall->worst, 0.999 / share) << witness;
+        EXPECT_LE(fall->worst, 1.006 / share) << witness;
+        EXPECT_NEAR(NeededByHand(fall->time_s, period_s, -kMiddle), most, 1e-3 * most);
+        EXPECT_EQ(fall->exceeded(), share < 1.0) << witness;
+      }
+      const auto caveats = ContactCaveatsOf(run);
+      const auto together = std::ranges::count_if(caveats, [](const std::string& text) {
+        return text.starts_with("all feet together fall");
+      });
+      EXPECT_EQ(together, share < 1.0 ? 1 : 0);
+    }
+  }
+}
+
+// The load is thrown up and down: where it falls faster than all weigh, no friction helps.
+TEST_F(Stairs, GroundThatWouldHaveToPullHoldsWithNoFriction) {
+  for (const double period_s : {0.6, 0.2}) {
+    const RunOutcome run =
+        Run(Replaced(Model(5.0, -kMiddle), "child: load, axis: x", "child: load, axis: z"),
+            Commands(period_s));
+    ASSERT_TRUE(run.report) << run.diagnostics.Text();
+    const ContactLoad* all = LoadOf(run, "reference", "");
+    ASSERT_NE(all, nullptr);
+    const ContactLoad::Use* fall = all->Find(Limit::kFall);
+    ASSERT_NE(fall, nullptr);
+    EXPECT_EQ(std::isinf(fall->worst), period_s < 0.5);
+    EXPECT_EQ(fall->exceeded(), period_s < 0.5);
+  }
+}
+
 TEST_F(Feet, AWrittenModelReadsBackToTheSameContacts) {
   const LoadResult loaded = LoadModelText(Fixture("biped"), "biped.yaml");
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
