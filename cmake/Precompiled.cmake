@@ -13,7 +13,7 @@ endfunction()
 set(MBV_COMMON_HEADERS
     <algorithm> <array> <cmath> <filesystem> <functional> <map> <memory> <numbers> <optional> <set>
     <span> <string> <string_view> <variant> <vector> <fmt/format.h>
-    <base/eigen_instances.h> <base/format_instances.h>)
+    <base/eigen_instances.h>)
 mbv_precompiled(mbv_pch LIBS Eigen3::Eigen fmt::fmt HEADERS ${MBV_COMMON_HEADERS})
 mbv_precompiled(mbv_light_pch LIBS Eigen3::Eigen fmt::fmt nlohmann_json::nlohmann_json
                 HEADERS ${MBV_COMMON_HEADERS} <nlohmann/json.hpp>)

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "cli/run_cli.h"
+#include "cli/cli.h"
 #include "equations/equations.h"
 #include "features/run/run_scenario.h"
 #include "features/stiffness/stiffness.h"

@@ -7,7 +7,7 @@ namespace mbv {
 /// Makes the kinds of documents known to CheckFile (verify/check_file.h).
 void UseDocumentKinds();
 
-/// Runs the program; never throws. Exit codes: cli/run_cli.h.
+/// Runs the program; never throws. Exit codes: cli/cli.h.
 [[nodiscard]] int RunProgram(int argc, char** argv);
 
 }  // namespace mbv

@@ -51,7 +51,7 @@ perturbed "a piece of an answer quoted" 's/^  degrees of freedom: 1 = .*/  degre
 perturbed "an answer that is not quoted" '/: ok$/d;/^\$ mbverify model/,/^…$/d'
 perturbed "an answer longer than quoted" '/^  degrees of freedom/,/^…$/{/^…$/d}'
 perturbed "another exit code quoted" 's/^2$/3/'
-perturbed "an exit code that nobody asks for" '/^\$ echo/,/^2$/d'
+perturbed "an exit code that is not asked for" '/^\$ echo/,/^2$/d'
 perturbed "a block without a file" 's/^`models.*continued$/and more/'
 perturbed "a missing block" '/continued$/,/^```$/d'
 perturbed "a block of another kind" 's/^```console$/```sh/'

@@ -6,10 +6,10 @@ const path = require('node:path');
 const esbuild = require('esbuild');
 
 // A page: its folder and main file in src/, the header that declares its functions, that of its
-// skeleton page.html if it has one, and the packages that are bundled with it.
+// skeleton page.html, and the packages that are bundled with it.
 const kPages = {
-  report: {header: 'report/html_assets.h', script: 'PageScript', style: 'PageStyle', packages: ['three', 'uplot']},
-  regression: {header: 'features/regress/index_assets.h', script: 'IndexScript', style: 'IndexStyle', skeleton: 'IndexPage', packages: []},
+  report: {header: 'report/page.h', script: 'PageScript', style: 'PageStyle', skeleton: 'PageSkeleton', packages: ['three', 'uplot']},
+  regression: {header: 'features/regress/summaries.h', script: 'IndexScript', style: 'IndexStyle', skeleton: 'IndexPage', packages: []},
 };
 
 // Literals are joined from pieces that compilers take without complaint.
@@ -67,7 +67,7 @@ namespace mbv {
 
 ${textFunction(page.script, script)}
 ${textFunction(page.style, style)}
-${page.skeleton ? textFunction(page.skeleton, fs.readFileSync(path.join(__dirname, 'src', name, 'page.html'), 'utf8')) : ''}
+${textFunction(page.skeleton, fs.readFileSync(path.join(__dirname, 'src', name, 'page.html'), 'utf8'))}
 }  // namespace mbv
 `);
 console.log(`${name} page: script ${script.length} bytes, style ${style.length} bytes`);

@@ -67,7 +67,7 @@ struct [[nodiscard]] Status {
 class Model {
  public:
   /// `name`: of a model that the program comes with or that lies in models/, or the path of a
-  /// model.yaml, URDF (.urdf) or MJCF (.xml). `parameters` of a model.yaml, others than its own.
+  /// model.yaml, URDF (.urdf) or MJCF (.xml). `parameters` of a model.yaml, other than its own.
   /// One thread loads at a time.
   [[nodiscard]] static Model Load(const std::string& name,
                                   const std::map<std::string, double>& parameters = {});
@@ -110,14 +110,14 @@ class Model {
 /// A force and a moment on a body, at a point of it.
 struct Wrench {
   std::string body;
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< in the body's frame [m]
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< [N]
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();   ///< in the body's frame [m]
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< [N]
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< about the point [N m]
 };
 
 /// Where everything is, and how it moves.
 struct State {
-  Eigen::VectorXd drives, drive_rates, drive_accelerations;              ///< per drive
+  Eigen::VectorXd drives, drive_rates, drive_accelerations;                ///< per drive
   Eigen::VectorXd prescribed, prescribed_rates, prescribed_accelerations;  ///< per prescribed joint
   /// Per output: x y z roll pitch yaw in its reference frame (roll-pitch-yaw about fixed x, y, z).
   Eigen::MatrixXd outputs;
@@ -220,8 +220,8 @@ class Solver {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A paper's equations, as a scenario drives them: drive forces as functions of its commands, by the
-/// closed form that its analytic witness takes. No loop is closed numerically.
+/// A paper's equations, as a scenario drives them: drive forces as functions of its commands, by
+/// the closed form that its analytic witness takes. No loop is closed numerically.
 class PaperEquations {
  public:
   /// `scenario`: MODEL/NAME or a file. Throws InputError where it cannot be read, where no closed

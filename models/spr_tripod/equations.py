@@ -609,7 +609,7 @@ def at_ball(p, i, force):
 
 @equation("(D11)", gives="leg{i}.S.reaction.force", each=LEGS, unit="N",
           given={**R_r, **of_bodies(BODIES, DEMANDS)},
-          printed="S_i from the balances of force, moment and each leg's hinge",
+          printed="S_i from the balances of force, moment and each leg's revolute joint",
           note="not in the paper")
 def eqD11(p, i, r, R, G_platform, F_platform, N_platform, W_platform,
           G_leg1_cyl, F_leg1_cyl, N_leg1_cyl, W_leg1_cyl,

@@ -940,7 +940,7 @@ def limb_matrix(plane):
           given={**TIP, **LIMB_LINKS, "R_eo": "lower_platform.rotation",
                  "f_X": "limb{i}.S.reaction.force[1]"},
           printed="30 unknowns, 30 equations",
-          corrected="R22' as a ball; platform acts on the cross along and about X",
+          corrected="R22' as a spherical joint; platform acts on the cross along and about X",
           note="sum of all moments about Y of the base: nothing else holds the limb's tilt")
 def solvable30(p, i, tip, A, R_eo, f_X, G_link1, F_link1, N_link1, W_link1,
                G_link1_p, F_link1_p, N_link1_p, W_link1_p, G_link2, F_link2, N_link2, W_link2,

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A witness of one's own: planar mechanisms of bars and sliders, without any library.
+"""An external solver: planar mechanisms of bars and sliders, without any library.
 
 mbverify calls it in a folder with mechanism.json, motion.csv and loads.csv (docs/how-to/external_solvers.md); it
 leaves witness.json and traces.csv there. Every body has three coordinates (x, y, angle from home) in

@@ -39,7 +39,6 @@ void StateBranch(const std::string& subject, double value, const std::string& wh
                                .quantity = "branch at home",
                                .actual = value > 0.0 ? 1.0 : -1.0,
                                .assumed = 1.0,
-                               .unit = {},
                                .why = why});
 }
 
@@ -58,14 +57,12 @@ std::vector<Finding> FindUncoveredLoads(const Coverage& coverage, const Mechanis
     if (!load.following.empty()) {
       findings.push_back(
           {.severity = Severity::kWarning,
-           .file = {},
            .message = fmt::format("load {} follows the mechanism's state", load.name),
            .hint = coverage.form + " takes loads as functions of time"});
       continue;
     }
     if (taken) continue;
     findings.push_back({.severity = Severity::kWarning,
-                        .file = {},
                         .message = fmt::format("load {} acts on {}", load.name, name),
                         .hint = fmt::format("{} takes loads on {}", coverage.form, takers)});
   }
@@ -137,7 +134,6 @@ class Checker {
 
   void Add(const std::string& fact, const std::string& assumption) {
     findings_.push_back({.severity = Severity::kWarning,
-                         .file = {},
                          .message = fact,
                          .hint = fmt::format("{} {}", coverage_.form, assumption)});
   }
@@ -259,8 +255,7 @@ class Checker {
                                     assumed.parent),
             .actual = angle,
             .assumed = 0.0,
-            .unit = "rad",
-            .why = {}});
+            .unit = "rad"});
   }
 
   void CheckAxis(const std::string& subject, const std::string& body, const Vec3& actual,
@@ -283,8 +278,7 @@ class Checker {
               .actual = 1.0 / drive->stiffness,
               .assumed = 1.0 / assumed.stiffness,
               .scale = 1.0 / std::min(drive->stiffness, assumed.stiffness),
-              .unit = "per N or N m",
-              .why = {}});
+              .unit = "per N or N m"});
     }
     if (const auto* on_joint = std::get_if<JointDrive>(&drive->kind)) {
       const std::string& joint = mechanism_.joints[size_t(on_joint->joint)].name;
@@ -370,8 +364,7 @@ class Checker {
               .actual = actual,
               .assumed = value,
               .scale = std::max(std::abs(actual), std::abs(value)),
-              .unit = unit,
-              .why = {}});
+              .unit = unit});
     };
     compare("length", beam->length(), assumed.length, "m");
     compare("area", beam->section.area, assumed.section.area, "m^2");

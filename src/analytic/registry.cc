@@ -24,26 +24,32 @@ std::vector<ClosedFormRow>& ClosedFormRows() {
        {"E2"},
        &stabilizing_platform::MakeClosedForm,
        &stabilizing_platform::CoverageOf},
-      {"spr_tripod", {"full"}, {}, &MakeSprTripod, &spr_tripod::CoverageOf},
-      {"cabin_robot", {"full"}, {}, &MakeCabinRobot, &cabin::CoverageOf},
-      {"scara_robot", {"full", "thin_rods"}, {}, &scara::MakeClosedForm, &scara::CoverageOf},
+      {"spr_tripod", {"full"}, {}, &spr_tripod::MakeClosedForm, &spr_tripod::CoverageOf},
+      {"cabin_robot", {"full"}, {}, &cabin_robot::MakeClosedForm, &cabin_robot::CoverageOf},
+      {"scara_robot",
+       {"full", "thin_rods"},
+       {},
+       &scara_robot::MakeClosedForm,
+       &scara_robot::CoverageOf},
   };
   return rows;
 }
 
 std::vector<StiffnessFormRow>& StiffnessFormRows() {
   static std::vector<StiffnessFormRow> rows = {
-      {"scara_robot", "platform", scara::StiffnessModels(), &scara::MakeStiffnessForm,
-       &scara::StiffnessCoverageOf, scara::ExampleStiffnessPose(), scara::UsualStiffnessMaps()},
-      {"cabin_robot", "tool", cabin::StiffnessModels(), &cabin::MakeStiffnessForm,
-       &cabin::StiffnessCoverageOf, cabin::ExampleStiffnessPose(), cabin::UsualStiffnessMaps()},
+      {"scara_robot", "platform", scara_robot::StiffnessModels(), &scara_robot::MakeStiffnessForm,
+       &scara_robot::StiffnessCoverageOf, scara_robot::ExampleStiffnessPose(),
+       scara_robot::UsualStiffnessMaps()},
+      {"cabin_robot", "tool", cabin_robot::StiffnessModels(), &cabin_robot::MakeStiffnessForm,
+       &cabin_robot::StiffnessCoverageOf, cabin_robot::ExampleStiffnessPose(),
+       cabin_robot::UsualStiffnessMaps()},
   };
   return rows;
 }
 
 std::vector<WorkspaceFormRow>& WorkspaceFormRows() {
   static std::vector<WorkspaceFormRow> rows = {
-      {"scara_robot", &scara::ComputeWorkspaceForm},
+      {"scara_robot", &scara_robot::ComputeWorkspaceForm},
       {"spr_tripod", &spr_tripod::ComputeWorkspaceForm},
   };
   return rows;

@@ -74,8 +74,8 @@ struct StiffnessFormRow {
 
 /// The coordinates by which a form takes its pose.
 struct PoseNames {
-  std::vector<std::string> needed, accepted;
-  std::string hint;  ///< "the pose is platform.x, …"
+  std::vector<std::string> needed, accepted = {};
+  std::string hint = {};  ///< "the pose is platform.x, …"
 };
 
 /// Coordinates that the form of this mechanism cannot take, and those it misses.

@@ -9,3 +9,5 @@ Eigen::MatrixXd OrthogonalFactor(const Eigen::ColPivHouseholderQR<Eigen::MatrixX
 }
 
 }  // namespace mbv
+
+MBV_FORMAT_INSTANCES(template)

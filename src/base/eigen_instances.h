@@ -3,6 +3,7 @@
 // matrix's own type: of an expression they are instantiated anew.
 #pragma once
 
+#include <fmt/format.h>
 #include <Eigen/Dense>
 
 namespace mbv::internal {
@@ -51,3 +52,12 @@ namespace mbv {
 [[nodiscard]] Eigen::MatrixXd OrthogonalFactor(
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr);
 }  // namespace mbv
+
+// fmt's own formatting into buffers, compiled once as well: every file that calls
+// fmt::format_to would instantiate it again.
+
+#define MBV_FORMAT_INSTANCES(DECLARATION)                                          \
+  DECLARATION void fmt::detail::vformat_to(buffer<char>&, basic_string_view<char>, \
+                                           basic_format_args<buffer_context<char>>, locale_ref);
+
+MBV_FORMAT_INSTANCES(extern template)

@@ -76,7 +76,7 @@ class JsonFieldReader {
     const JsonValue at = json_.at(key);
     const std::string word = at;
     const auto found = std::find(words.begin(), words.end(), word);
-    if (found == words.end()) at.Refuse("is none of the words that are known");
+    if (found == words.end()) at.Refuse("is not one of the known words");
     value = static_cast<T>(found - words.begin());
   }
 

@@ -15,7 +15,7 @@ inline nlohmann::ordered_json Number(double value) {
   return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
 }
 
-/// So many blanks per level, and a line feed at the end; bytes that are no text become U+FFFD.
+/// `blanks` per level, and a line feed at the end; bytes that are no text become U+FFFD.
 [[nodiscard]] std::string Dump(const nlohmann::ordered_json& json, int blanks = 2);
 
 // The rest is there of nlohmann::json and of ordered_json.

@@ -53,7 +53,7 @@ inline constexpr Role kSolver{
 /// The generic solver, or a table in its place.
 inline constexpr Role kReference{
     "reference", "reference", "reference", RoleKind::kGeneric, {&kAnalytic, &kSolver}};
-/// The generic solver where servos led the simulation.
+/// The generic solver where servos moved the simulation.
 inline constexpr Role kReached{"reached", "reached", "reference", RoleKind::kAfterwards, {}};
 inline constexpr Role kSimulated{"simulated",
                                  "simulation",

@@ -31,9 +31,7 @@ struct [[nodiscard]] RunSummary {
   bool states_time = false;             ///< `message` states `time_s`
 
   [[nodiscard]] bool ok() const { return stop == Stop::kDone; }
-  static RunSummary Done() {
-    return {.stop = Stop::kDone, .message = "done", .where = {}, .unit = {}};
-  }
+  static RunSummary Done() { return {.stop = Stop::kDone, .message = "done"}; }
 };
 
 /// See math/bytes.h.

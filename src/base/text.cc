@@ -178,6 +178,12 @@ std::string Joined(const std::vector<std::string>& words, size_t most) {
   return words.size() > most ? text + ", …" : text;
 }
 
+std::string JoinedAndMore(const std::vector<std::string>& words, size_t most) {
+  if (words.size() <= most) return Joined(words);
+  const std::vector<std::string> first(words.begin(), words.begin() + static_cast<long>(most));
+  return fmt::format("{} and {} more", Joined(first), words.size() - most);
+}
+
 bool Contains(const std::vector<std::string>& words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }

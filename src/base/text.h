@@ -43,6 +43,9 @@ namespace mbv {
 [[nodiscard]] std::string Joined(const std::vector<std::string>& words,
                                  size_t most = static_cast<size_t>(-1));
 
+/// "a, b, c and 4 more" where there are more than `most`.
+[[nodiscard]] std::string JoinedAndMore(const std::vector<std::string>& words, size_t most = 3);
+
 [[nodiscard]] bool Contains(const std::vector<std::string>& words, std::string_view word);
 
 /// Of bodies, joints, parameters … all that have a `name`.

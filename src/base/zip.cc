@@ -11,7 +11,7 @@
 #include <memory>
 #include <set>
 
-#include "base/names.h"
+#include "base/files.h"
 #include "base/text.h"
 
 namespace mbv {

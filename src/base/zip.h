@@ -16,7 +16,7 @@ namespace mbv {
 
 /// A file in an archive.
 struct ArchiveEntry {
-  std::string path;  ///< IsPlainPath() (base/names.h), in UTF-8
+  std::string path;  ///< IsPlainPath() (base/files.h), in UTF-8
   std::string content;
   bool executable = false;
 };

@@ -18,7 +18,6 @@
 #include <system_error>
 
 #include "base/text.h"
-#include "cli/run_cli.h"
 #include "cli/terminal.h"
 #include "model_file/mesh/read_mesh.h"
 #include "model_file/yaml/parsed_documents.h"

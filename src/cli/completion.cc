@@ -32,8 +32,6 @@ struct CommandWords {
 /// All commands and options that help shows, the program itself first.
 [[nodiscard]] std::vector<CommandWords> WordsOf(const CLI::App& app);
 
-// The manual page of the program, of what its commands say of themselves.
-
 namespace {
 
 std::string PathOf(const CLI::App& command) {
@@ -274,6 +272,8 @@ std::vector<CommandWords> WordsOf(const CLI::App& app) {
 std::string CompletionScript(const std::string& shell, const std::vector<CommandWords>& commands) {
   return shell == "bash" ? Bash(commands) : shell == "zsh" ? Zsh(commands) : Fish(commands);
 }
+
+// The manual page of the program, of what its commands say of themselves.
 
 namespace {
 

@@ -4,7 +4,7 @@
 //   1. what a witness shows by itself: rates that are no derivatives, its own command missed
 //      (attribution_kinematics.cc);
 //   2. where forces or servos move the simulation: whether it confirms the forces (driven.cc);
-//      elsewhere motion: drive motion that leads elsewhere than commanded. Wrong motion makes wrong
+//      elsewhere motion: drive motion that goes elsewhere than commanded. Wrong motion makes wrong
 //      forces, so it is looked at before them;
 //   3. the two that are closest by far stand against the third;
 //   4. of two that differ, the one whose own energy drifts (attribution_energy.cc).
@@ -19,7 +19,6 @@
 #include <optional>
 
 #include "comparison/comparison.h"
-#include "comparison/drive_motion.h"
 #include "comparison/driven.h"
 #include "comparison/metrics.h"
 #include "comparison/table_tube.h"
@@ -237,7 +236,7 @@ bool Confirms(const CheckResult* check) {
 }
 
 // Something that does not follow the drive motion has found it right: the command, where MuJoCo's
-// kinematics leads the outputs, or the other witness, which has computed it, too.
+// kinematics moves the outputs, or the other witness, which has computed it, too.
 bool DriveMotionIsConfirmed(const ComparisonInput& input, const Comparison& comparison,
                             const std::string& odd) {
   const auto by_command = [&](Metric metric) {
@@ -279,8 +278,7 @@ std::string SharedBy(const ComparisonInput& input, const Comparison& comparison,
   if (!follow || DriveMotionIsConfirmed(input, comparison, odd)) return "";
   const Role* driver = FindRole(input.driven_by);
   return fmt::format(
-      "{} have the drive motion in common that the {} computes, and nothing else "
-      "confirms it",
+      "{} have the drive motion in common that the {} computes, and nothing else confirms it",
       Listed(comparison, agree), driver == nullptr ? input.driven_by : driver->method);
 }
 

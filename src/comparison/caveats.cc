@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <utility>
 
@@ -11,7 +10,6 @@
 #include "comparison/contact_load.h"
 #include "comparison/driven.h"
 #include "comparison/verdict.h"
-#include "mechanism/channels.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -231,8 +229,7 @@ std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& c
                        CoarseLimits(input, comparison).text);
   }
   return "nothing moves, weighs or exerts a force: the drive forces vanish whatever the masses "
-         "are, so "
-         "nothing was verified";
+         "are, so nothing was verified";
 }
 
 Caveat LeftOutCaveat(const std::string& text) {

@@ -13,7 +13,7 @@ namespace mbv {
 /// motors over samples that do not resolve the motion.
 void MarkInsensitive(const ComparisonInput& input, Comparison* comparison);
 
-/// Why no check of drive forces (of a free motion: of where it leads) verified anything; "" if one
+/// Why no check of drive forces (of a free motion: of where it goes) verified anything; "" if one
 /// did.
 [[nodiscard]] std::string WhyNothingVerified(const ComparisonInput& input,
                                              const Comparison& comparison);

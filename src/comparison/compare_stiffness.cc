@@ -44,7 +44,7 @@ Measured WorstOf(const Mat6& difference, const char* matrix) {
 
 Measured WorstShare(const StiffnessResult& measured, const StiffnessResult& truth) {
   const Vec6 scale = ScaleOf(truth.C);
-  Measured worst{.value = 0.0, .channel = {}};
+  Measured worst{.value = 0.0};
   for (const ComplianceShare& share : truth.shares) {
     const auto found = std::ranges::find(measured.shares, share.element, &ComplianceShare::element);
     if (found == measured.shares.end()) return {.channel = share.element + " is missing"};

@@ -8,13 +8,10 @@
 
 #include "comparison/caveats.h"
 #include "comparison/compare_stiffness.h"
-#include "comparison/derivatives.h"
-#include "comparison/drive_motion.h"
 #include "comparison/driven.h"
 #include "comparison/force_band.h"
 #include "comparison/force_scale.h"
 #include "comparison/pair_reader.h"
-#include "comparison/table_diagnosis.h"
 #include "comparison/table_tube.h"
 #include "comparison/verdict.h"
 #include "math/spatial.h"
@@ -726,7 +723,7 @@ PairComparison ComparePair(const ComparisonInput& input, const Trace& measured,
   internal::CompareForces(input, reader, &pair);
   CompareDriveMotion(input, reader, &pair);
   ComparePoses(input, reader, &pair);
-  // A free motion is judged by where it leads.
+  // A free motion is judged by where it goes.
   const bool trajectory = std::any_of(pair.metrics.begin(), pair.metrics.end(),
                                       [](const auto& entry) { return IsTrajectory(entry.first); });
   if (pair.compared && pair.drives.empty() && !trajectory) {

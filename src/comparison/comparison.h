@@ -17,7 +17,7 @@
 #include "base/roles.h"
 #include "base/run_summary.h"
 #include "comparison/metrics.h"
-#include "kinematics/driven_twists.h"
+#include "kinematics/command_rank.h"
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -59,7 +59,7 @@ struct Witness {
     std::string program;
     LimitColumn limits = LimitColumn::kReference;
     std::optional<double> force_nrmse;  ///< instead of that limit
-    std::vector<std::pair<std::string, std::string>> declined;
+    std::vector<std::pair<std::string, std::string>> declined = {};
     double compute_s = kNan;  ///< without its start, reading and writing, as it says itself
   };
   std::optional<Foreign> foreign = {};
@@ -75,11 +75,11 @@ struct ComparisonInput {
   const Motion* motion = nullptr;
   CheckLimits limits;
   LimitColumn simulation_limits = LimitColumn::kForward;
-  double start_window_s = 0.0;     ///< force samples before it are left out (named in the scenario)
-  std::vector<Witness> witnesses;  ///< in the order in which they are shown
-  std::string driven_by;           ///< the witness whose kinematics the simulation follows
+  double start_window_s = 0.0;  ///< force samples before it are left out (named in the scenario)
+  std::vector<Witness> witnesses = {};  ///< in the order in which they are shown
+  std::string driven_by;                ///< the witness whose kinematics the simulation follows
   /// Channels of reactions that statics leaves open ("hinge.reaction.fz").
-  std::vector<std::string> reactions_not_unique;
+  std::vector<std::string> reactions_not_unique = {};
   const AlignedTable* table = nullptr;            ///< what the reference is, if it is a table
   const DrivenTwists* twists = nullptr;           ///< TwistsFor() this; found where needed if null
   DriveMode mode = DriveMode::kPrescribedMotion;  ///< what moves the simulation's drives (driven.h)
@@ -92,12 +92,12 @@ struct ComparisonInput {
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
   std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
-  std::string unchecked_coverage = {};     ///< why nobody knows what the analytic witness covers
+  std::string unchecked_coverage = {};     ///< why it is unknown what the analytic witness covers
   /// The witnesses bring stiffnesses instead of traces; the motion is the pose, commanded.
   bool of_stiffness = false;
 };
 
-/// Judges where a free motion leads.
+/// Judges where a forward motion goes.
 [[nodiscard]] constexpr bool IsTrajectory(Metric metric) {
   return metric == Metric::kPositionM || metric == Metric::kPositionRad ||
          metric == Metric::kPoseM || metric == Metric::kPoseRad;
@@ -188,7 +188,7 @@ struct EnergyAudit {
 /// What one witness shows by itself.
 struct WitnessMetrics {
   std::string witness;
-  std::map<Metric, Measured> metrics;
+  std::map<Metric, Measured> metrics = {};
   std::optional<EnergyAudit> energy = {};
   std::string derivatives_gap = {};  ///< why rates were not checked against positions; "" if so
   std::string unresolved = {};       ///< see UnresolvedBySamples(); "" of tables
@@ -325,5 +325,34 @@ inline constexpr double kSameFactor = 5e-3;
 
 /// The known one that a fitted factor > 0 is; null if it is none.
 [[nodiscard]] const KnownFactor* FindFactor(double factor);
+
+// Whether a witness' drive rates are the time derivatives of its drive positions.
+
+/// Central differences of sixth order of positions and velocities against the recorded rates, over
+/// the rate's RMS, at least RestFloorOf() the trace.
+/// Where samples do not resolve the motion nothing is judged: the differences of fourth and sixth
+/// order disagree there, or a command or drive turns too far between two samples.
+/// `derivatives_gap` says why drives were not judged.
+void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out);
+
+/// Why the samples of a trace do not resolve the motion (by the same formulas) or the forces and
+/// powers of drives (midpoints by four and by six samples disagree): peaks, means, energies and
+/// margins over them then mean nothing. "" where they do. Samples too few for the formulas are
+/// judged by the commands alone: fewer than twelve per oscillation, six of a power. `measured`:
+/// where MeasureDerivatives() of the trace was called before.
+[[nodiscard]] std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace,
+                                              const WitnessMetrics* measured = nullptr);
+
+// Where the energy of one witness' run came from and went, and whether all of it is accounted for.
+
+/// Balances energies and work; nothing where the trace has no energies or less than four samples.
+/// The drift E(t) − E(0) − W(t) is measured against the energy turned over: the largest kinetic
+/// energy or total work, at least what the force scale does over 0.1 % of the characteristic
+/// length; where joints are prescribed, at most what drives and the bodies they carry can turn
+/// over, whatever the base does. `limit` says from when on the drift counts as one, where the work
+/// was integrated.
+[[nodiscard]] std::optional<EnergyAudit> AuditEnergy(const ComparisonInput& input,
+                                                     const Trace& trace,
+                                                     std::optional<double> limit);
 
 }  // namespace mbv

@@ -10,7 +10,6 @@
 #include <optional>
 
 #include "base/text.h"
-#include "mechanism/channels.h"
 #include "mechanism/reach.h"
 
 namespace mbv {

@@ -2,7 +2,7 @@
 //
 // * Force-driven: the drive forces of the simulation are another witness' own, so the motion is
 //   judged. In open loop errors grow by themselves: the limit of every metric of motion is how far
-//   the same run leads when its forces are perturbed by ComparisonInput::perturbation of their RMS.
+//   the same run goes when its forces are perturbed by ComparisonInput::perturbation of their RMS.
 // * Servo: the forces are judged by the reference evaluated on the motion that was reached (witness
 //   kReached). Against what is commanded they differ by what the servo's error costs: reported,
 //   and judged where the scenario states a limit (column `servo`).
@@ -60,5 +60,23 @@ void LeaveOutReachedMotion(PairComparison* pair);
 /// simulation's motion and forces show nothing.
 [[nodiscard]] Attribution AttributeDriven(const ComparisonInput& input,
                                           const Comparison& comparison);
+
+// Whose motion the drives follow, and which comparisons are therefore no evidence.
+
+/// One sentence about who gives the simulation its motion; "" where nothing was simulated.
+[[nodiscard]] std::string DrivingText(const ComparisonInput& input);
+
+/// True of coordinates of outputs and of joints without a drive.
+[[nodiscard]] bool IsOfTask(const Coordinate& coordinate);
+/// True when some command is about one of these: drive motions are then computed, not given.
+[[nodiscard]] bool IsTaskSpace(const Motion& motion);
+
+/// True when the commands determine every drive's motion, so that all computations are given it.
+[[nodiscard]] bool GivesAllDriveMotion(const ComparisonInput& input);
+
+/// True when a check compares a drive motion with itself: the simulation's with its own command
+/// to follow, or a drive that the scenario commands with its command. Such a check can fail; that
+/// it passes verifies nothing.
+[[nodiscard]] bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& check);
 
 }  // namespace mbv

@@ -8,7 +8,7 @@
 
 #include "base/types.h"
 #include "comparison/comparison.h"
-#include "kinematics/driven_twists.h"
+#include "kinematics/command_rank.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {

@@ -14,7 +14,7 @@ namespace mbv {
 struct Measured {
   double value = kNan;
   double time_s = kNan;
-  std::string channel;
+  std::string channel = {};
   bool floored = false;   ///< relative to a floor that is larger than the quantity itself
   double of_zero = kNan;  ///< value if zero had been measured everywhere: at most 1
 };
@@ -56,7 +56,7 @@ class ErrorSum {
  private:
   double sum_error2_ = 0.0, sum_truth2_ = 0.0, max_truth_ = 0.0;
   size_t count_ = 0;
-  Measured worst_{.value = 0.0, .time_s = kNan, .channel = {}};
+  Measured worst_{.value = 0.0, .time_s = kNan};
 };
 
 /// Decimal digits that agree, from a relative error: −log10, 0 … 16; NaN stays NaN.

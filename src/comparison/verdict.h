@@ -61,7 +61,8 @@ void SortByDistance(std::vector<Distance>* distances) {
                    [&](const Distance& a, const Distance& b) { return key(a) < key(b); });
 }
 
-/// The odd one must be this much farther from each of the others than they are from each other.
+/// The odd one must be farther by this factor from each other witness than they are from each
+/// other.
 inline constexpr double kClearlyFarther = 10.0;
 
 /// The nearest pair in which a witness takes part, of sorted distances; null if there is none.

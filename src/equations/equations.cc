@@ -8,8 +8,6 @@
 
 #include "base/files.h"
 #include "base/inputs.h"
-#include "base/text.h"
-#include "equations/languages.h"
 
 namespace mbv {
 namespace {

@@ -8,6 +8,8 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -16,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "analytic/closed_form.h"
 #include "base/diagnostics.h"
 #include "base/types.h"
 #include "math/profile.h"
@@ -173,5 +176,46 @@ class Equations {
 /// The interpreters' sides as they are compiled in: equations.py; names and texts of Octave's.
 [[nodiscard]] std::string EquationsPythonText();
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> EquationsOctaveFiles();
+
+// A user's equations as the closed form of a scenario.
+
+/// A closed form out of a file, or why there is none.
+struct FileForm {
+  std::unique_ptr<ClosedForm> closed_form;
+  /// Why the equations do not apply: other commands, another mechanism, loads or masses that they
+  /// do not cover. Empty where there is a closed form, and after errors.
+  std::vector<Finding> uncovered;
+  /// For every verdict: what they take for granted is not stated. "" where it is.
+  std::string unchecked;
+};
+
+/// The form of the file whose commands are the scenario's. It is tried at the motion's first
+/// instant: what does not work there is an error in `diagnostics`, with the file's own line; so are
+/// stated rates that are not the derivatives of the positions.
+[[nodiscard]] FileForm MakeFileForm(const std::string& file, const Mechanism& mechanism,
+                                    const Motion& motion, Diagnostics* diagnostics);
+
+// The languages of equations, one row each.
+
+/// A language whose files run as a program.
+struct EquationLanguage {
+  const char* name;       ///< "Python"
+  const char* extension;  ///< ".py"
+  /// The interpreter's side: names and texts of files, which are put into a folder.
+  std::vector<std::pair<std::string, std::string>> (*files)();
+  /// Program and arguments that answer calls about `file`.
+  std::vector<std::string> (*command)(const std::filesystem::path& folder, const std::string& file);
+  /// What a user reads of it: program and file.
+  std::vector<std::string> (*shown)(const std::string& file);
+};
+
+/// Of a file by its name; null: none.
+[[nodiscard]] const EquationLanguage* FindEquationLanguage(const std::string& file);
+
+[[nodiscard]] std::shared_ptr<Equations> MakeProgramEquations(const std::string& file,
+                                                              const EquationLanguage& language);
+/// Formulas of a YAML file.
+[[nodiscard]] std::shared_ptr<Equations> MakeFormulaEquations(const std::string& file,
+                                                              const std::string& text);
 
 }  // namespace mbv

@@ -67,7 +67,7 @@ class Series:
         return f"Series({self.a!r}, {self.b!r}, {self.c!r})"
 
     def _pair(self, other):
-        # Both as coefficients of the higher variable; None: the other is no number.
+        # Both as coefficients of the higher variable; None: the other is not a number.
         if isinstance(other, Series):
             if other.level == self.level:
                 return self, other
@@ -194,40 +194,6 @@ class Series:
         # A function of this with its two derivatives at a.
         return Series(f, f1 * self.b, f1 * self.c + 0.5 * f2 * (self.b * self.b), self.level)
 
-    # What numpy calls of the elements of an array of objects.
-    def sin(self):
-        return sin(self)
-
-    def cos(self):
-        return cos(self)
-
-    def tan(self):
-        return tan(self)
-
-    def sqrt(self):
-        return sqrt(self)
-
-    def exp(self):
-        return exp(self)
-
-    def log(self):
-        return log(self)
-
-    def arcsin(self):
-        return asin(self)
-
-    def arccos(self):
-        return acos(self)
-
-    def arctan(self):
-        return atan(self)
-
-    def arctan2(self, x):
-        return atan2(self, x)
-
-    def hypot(self, y):
-        return hypot(self, y)
-
 
 def _is_number(x):
     # numpy's scalars included, without numpy.
@@ -322,6 +288,14 @@ def hypot(x, y):
 def abs_(x):
     """|x|, with derivatives."""
     return abs(x)
+
+
+# What numpy calls of the elements of an array of objects.
+for _name, _function_of in (
+    ("sin", sin), ("cos", cos), ("tan", tan), ("sqrt", sqrt), ("exp", exp), ("log", log),
+    ("arcsin", asin), ("arccos", acos), ("arctan", atan), ("arctan2", atan2), ("hypot", hypot),
+):
+    setattr(Series, _name, _function_of)
 
 
 # Vectors and matrices of such numbers.

@@ -1,4 +1,4 @@
-#include "equations/file_form.h"
+#include "equations/equations.h"
 
 #include <fmt/format.h>
 
@@ -465,7 +465,7 @@ class FileFormMaker {
     const EquationResult<FormSample> first = form->Ask(command, true);
     if (!first) {
       using Kind = EquationFailure::Kind;
-      // A pose out of reach is the run's to tell, with its time.
+      // A pose out of reach is reported by the run, with its time.
       if (first.failure.kind == Kind::kUnreachable || first.failure.kind == Kind::kSingular) {
         return true;
       }

@@ -6,8 +6,8 @@
 #include <cstring>
 
 #include "base/text.h"
+#include "equations/equations.h"
 #include "equations/formula.h"
-#include "equations/languages.h"
 #include "model_file/yaml/yaml_reader.h"
 
 namespace mbv {

@@ -11,7 +11,7 @@
 #include "base/scratch_folder.h"
 #include "base/text.h"
 #include "base/worker_pool.h"
-#include "equations/languages.h"
+#include "equations/equations.h"
 
 namespace mbv {
 namespace {
@@ -347,15 +347,15 @@ class ProgramEquations final : public Equations {
       if (auto info = Load(); !info) return {{}, std::move(info.failure)};
       if (parameters_ && call.at("do") != "set") {
         const Json set = {{"do", "set"}, {"parameters", *parameters_}};
-        const auto done = Talk<bool>(set, kCall_s, [](const JsonValue&) { return true; });
+        const auto done = Exchange<bool>(set, kCall_s, [](const JsonValue&) { return true; });
         if (!done) return {{}, done.failure};
       }
     }
-    return Talk<T>(call, timeout_s, read);
+    return Exchange<T>(call, timeout_s, read);
   }
 
   template <typename T, typename Read>
-  EquationResult<T> Talk(const Json& call, double timeout_s, const Read& read) {
+  EquationResult<T> Exchange(const Json& call, double timeout_s, const Read& read) {
     Conversation::Answer answer = program_->Call(DumpLine(call), timeout_s);
     if (answer.trouble != Conversation::Trouble::kNone) {
       const auto kind = answer.trouble == Conversation::Trouble::kNotStarted

@@ -413,7 +413,7 @@ std::vector<JsonFinding> SchemaFindings(const Value& json) {
   while (results.popError(error)) {
     if (Path path = PathOf(error.context); path.size() >= deepest.size()) deepest = std::move(path);
   }
-  return {{.path = deepest, .message = "does not fit the schema", .hint = {}}};
+  return {{.path = deepest, .message = "does not fit the schema"}};
 }
 
 Vec3 VectorAt(const Value& v) {

@@ -22,7 +22,7 @@ inline constexpr const char* kMechanismSchema = "mbverify/mechanism/1";
 
 struct JsonFinding {
   std::vector<std::string> path;  ///< keys and indices from the root
-  std::string message, hint;
+  std::string message, hint = {};
   int line = 0, column = 0;  ///< where the text is not JSON; 0 elsewhere
 };
 

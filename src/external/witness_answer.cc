@@ -8,7 +8,7 @@
 #include "base/json_document.h"
 #include "base/text.h"
 #include "mechanism/channels.h"
-#include "scenario/tables/columns.h"
+#include "scenario/tables/table.h"
 #include "scenario/tables/text.h"
 
 namespace mbv {
@@ -41,7 +41,6 @@ WitnessAnswer AnswerOf(const JsonValue& json) {
                        .version = TextAt(json, "version"),
                        .method = TextAt(json, "method"),
                        .refused = TextAt(json, "refused"),
-                       .declined = {},
                        .compute_s = AmountAt(json, "compute_s")};
   if (const std::string units = TextAt(json, "units"); units != "SI") {
     json.at("units").Refuse(fmt::format("is '{}': SI and radians are needed", units));

@@ -280,7 +280,7 @@ Mechanism GroupAlone(const Mechanism& whole, const LoopGroup& group) {
 
 GroupAssemblies FindAssemblies(const Mechanism& mechanism, const LoopGroup& group,
                                const std::vector<bool>& driven, const JointCoordinates& guess) {
-  if (group.joints.empty()) return {.group = group, .assemblies = {}, .best = {}};
+  if (group.joints.empty()) return {.group = group, .best = {}};
   return AssemblySearch(mechanism, group, driven, guess).Run();
 }
 

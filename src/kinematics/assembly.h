@@ -26,11 +26,11 @@ struct Assembly {
 
 struct GroupAssemblies {
   LoopGroup group;
-  std::vector<Assembly> assemblies;  ///< distinct ones, nearest to the guesses first
-  bool from_guess = false;           ///< the first one was reached from the guesses themselves
-  bool drives_moved = false;         ///< driven joints had to leave their guesses
-  JointCoordinates best;             ///< least gap, where nothing closes
-  int starts = 0;                    ///< tried
+  std::vector<Assembly> assemblies = {};  ///< distinct ones, nearest to the guesses first
+  bool from_guess = false;                ///< the first one was reached from the guesses themselves
+  bool drives_moved = false;              ///< driven joints had to leave their guesses
+  JointCoordinates best;                  ///< least gap, where nothing closes
+  int starts = 0;                         ///< tried
 };
 
 /// A group as a mechanism of its own, its innermost body as the world: the group's tree joints,

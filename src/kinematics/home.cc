@@ -10,10 +10,7 @@
 #include <optional>
 #include <random>
 
-#include "base/demand.h"
-#include "kinematics/closure_residual.h"
 #include "kinematics/constraints.h"
-#include "kinematics/frame_pair.h"
 #include "kinematics/mobility.h"
 #include "kinematics/tree_motion.h"
 #include "mechanism/joint_pose.h"

@@ -11,7 +11,7 @@
 
 #include "base/types.h"
 #include "kinematics/assembly.h"
-#include "kinematics/closure_residual.h"
+#include "kinematics/tree_motion.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {

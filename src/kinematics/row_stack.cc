@@ -92,7 +92,7 @@ using Places = std::vector<Eigen::Index>;
 // Rows and columns that entries connect: a matrix of mechanisms side by side falls into one part
 // per mechanism.
 struct Part {
-  Places rows, columns;
+  Places rows, columns = {};
   [[nodiscard]] bool empty() const { return rows.empty() || columns.empty(); }
   [[nodiscard]] auto smaller() const {
     return static_cast<Eigen::Index>(std::min(rows.size(), columns.size()));
@@ -126,7 +126,7 @@ std::vector<Part> PartsOf(const SparseRows& J) {
     if (first[i] >= 0) {
       parts[part_of[find(first[i])]].rows.push_back(i);
     } else {
-      parts.push_back({.rows = {i}, .columns = {}});  // constrains nothing
+      parts.push_back({.rows = {i}});  // constrains nothing
     }
   }
   return parts;

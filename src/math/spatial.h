@@ -32,6 +32,20 @@ inline Vec6 ShiftWrench(const Vec6& F_P, const Vec3& p_QP) {
   return F_Q;
 }
 
+/// Twist of P for a unit rotation about an axis (unit vector) through Q.
+inline Vec6 RotationScrew(const Vec3& axis, const Vec3& p_PQ) {
+  Vec6 screw;
+  screw << axis, p_PQ.cross(axis);
+  return screw;
+}
+
+/// Twist for a unit translation along an axis (unit vector).
+inline Vec6 TranslationScrew(const Vec3& axis) {
+  Vec6 screw;
+  screw << Vec3::Zero(), axis;
+  return screw;
+}
+
 inline Mat3 RotX(double a) { return Eigen::AngleAxisd(a, Vec3::UnitX()).toRotationMatrix(); }
 inline Mat3 RotY(double a) { return Eigen::AngleAxisd(a, Vec3::UnitY()).toRotationMatrix(); }
 inline Mat3 RotZ(double a) { return Eigen::AngleAxisd(a, Vec3::UnitZ()).toRotationMatrix(); }

@@ -137,7 +137,8 @@ class SpinFinder {
     const double size = body.I_Bcm_B.trace() + body.mass * distance_ * distance_;
     if (std::max(uneven, tilted.norm()) <= kBeside * size) return "";
     return fmt::format(
-        "the inertia of {} is not symmetric about the line through its balls (by {:.3g} kg m²)",
+        "the inertia of {} is not symmetric about the line through its spherical joints (by {:.3g} "
+        "kg m²)",
         body.name, std::max(uneven, tilted.norm()));
   }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/demand.h"
-#include "math/channel.h"
+#include "math/trace.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -70,13 +70,6 @@ bool IsTranslation(const Mechanism& mechanism, const Drive& drive) {
 }
 
 }  // namespace
-
-Mechanism::Mechanism() = default;
-Mechanism::~Mechanism() = default;
-Mechanism::Mechanism(const Mechanism&) = default;
-Mechanism& Mechanism::operator=(const Mechanism&) = default;
-Mechanism::Mechanism(Mechanism&&) noexcept = default;
-Mechanism& Mechanism::operator=(Mechanism&&) noexcept = default;
 
 int Mechanism::FindBody(const std::string& n) const { return FindNamed(bodies, n); }
 int Mechanism::FindJoint(const std::string& n) const { return FindNamed(joints, n); }

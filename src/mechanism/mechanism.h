@@ -279,8 +279,8 @@ struct Coupling {
     std::vector<double> polynomial;  ///< coefficients of q, q², …; at least one
   };
   std::string name;
-  std::vector<Term> terms;  ///< at least two
-  double constant = 0.0;    ///< of the sum
+  std::vector<Term> terms = {};  ///< at least two
+  double constant = 0.0;         ///< of the sum
 };
 
 /// Viscous damping: force −c q̇.
@@ -381,14 +381,6 @@ struct FloatingBase {
 };
 
 struct Mechanism {
-  // Compiled once (mechanism.cc): each file that copies one would do so again.
-  Mechanism();
-  ~Mechanism();
-  Mechanism(const Mechanism&);
-  Mechanism& operator=(const Mechanism&);
-  Mechanism(Mechanism&&) noexcept;
-  Mechanism& operator=(Mechanism&&) noexcept;
-
   std::string name;
   std::string file;  ///< model.yaml it came from, as given
   std::string description;

@@ -74,8 +74,8 @@ struct Command {
     double factor = 1.0;
   };
   std::string name;  ///< "roll", "limb1.drive", "platform.z", "limb1.drive - limb1.drive_p"
-  std::vector<Term> terms;
-  Profile profile;
+  std::vector<Term> terms = {};
+  Profile profile = {};
 };
 
 /// A number that follows from time and from coordinates of the mechanism and their rates [SI].

@@ -29,7 +29,7 @@ struct SpanningTreeResult {
 /// force-only joints become the closures. Depends only on the order and data of the joints.
 SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& hints = {});
 
-/// True when a drive, a prescribed joint or a coupling leads a coordinate of this joint.
+/// True when a drive, a prescribed joint or a coupling prescribes a coordinate of this joint.
 [[nodiscard]] bool HasLedCoordinate(const Mechanism& mechanism, int joint);
 /// True when one of these or a force element uses a coordinate of this joint.
 [[nodiscard]] bool HasUsedCoordinate(const Mechanism& mechanism, int joint);

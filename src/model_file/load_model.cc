@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/names.h"
+#include "base/files.h"
 #include "base/text.h"
 #include "mechanism/mechanism.h"
 #include "model_file/load_bodies.h"

@@ -11,12 +11,12 @@
 
 #include "base/text.h"
 #include "kinematics/assembly.h"
-#include "kinematics/closure_residual.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
 #include "kinematics/row_stack.h"
+#include "kinematics/tree_motion.h"
 #include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/mechanism.h"
@@ -571,7 +571,7 @@ void WarnAboutMovedDrives(const Mechanism& mechanism, ModelReport* report) {
 
 }  // namespace
 
-// Only a search led to closed loops: which assembly is meant is not known.
+// Only a search closed the loops: which assembly is meant is not known.
 void WarnAboutAssembly(const Mechanism& mechanism, const HomeResult& home, ModelReport* report) {
   constexpr size_t kMostJoints = 4;
   std::vector<std::pair<double, int>> moved;  // by how much, tree joint

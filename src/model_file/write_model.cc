@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "base/names.h"
+#include "base/files.h"
 #include "mechanism/reach.h"
 #include "model_file/element_text.h"
 #include "model_file/mesh/read_mesh.h"

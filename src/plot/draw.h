@@ -78,4 +78,13 @@ enum class PictureFormat { kPdf, kSvg, kPng };
 /// Whether the fonts on this machine lack characters of its texts (Chinese without fonts-noto-cjk).
 [[nodiscard]] bool LacksGlyphs(const Figure& figure, const FigureStyle& style);
 
+// Figures as source for TeX (pgfplots): the same places, ranges, colours and dashes as drawn, and
+// all numbers in files beside it, so that an author may change what they like.
+
+/// Names and contents: NAME.tex; NAME.dat with two columns x0 y0, x1 y1, … for each curve, "nan"
+/// where it has a gap or no more points; NAME_map.dat with x, y and c (its logarithm to base 10 on
+/// a logarithmic scale) for each cell of a map.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> PgfFiles(const Figure& figure,
+                                                                        const FigureStyle& style);
+
 }  // namespace mbv

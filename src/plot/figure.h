@@ -1,5 +1,5 @@
 // A figure for a paper as data: panels one below the other, their axes, curves and legends. Drawn
-// by plot/draw.h (PDF, SVG, PNG), written as source for TeX by plot/pgf.h.
+// by plot/draw.h (PDF, SVG, PNG), written as source for TeX by plot/draw.h.
 //
 // Texts know a little markup: *F* is a symbol (italic), _{max} and ^{2} stand below and above.
 #pragma once
@@ -10,8 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/diagnostics.h"
 #include "base/types.h"
 #include "math/plot.h"
+#include "math/trace.h"
 
 namespace mbv {
 
@@ -87,5 +89,17 @@ struct FigureSpec {
   double width_mm = kNan, height_mm = kNan;  ///< NaN: the style's
   std::vector<PanelSpec> panels = {};
 };
+
+// Whether the figures that a scenario composes can be drawn.
+
+/// Whether a channel's name fits a pattern, in which '*' stands for any characters.
+[[nodiscard]] bool FitsPattern(const std::string& name, const std::string& pattern);
+
+/// Signals, witnesses and units that do not exist or do not go together are errors at their places
+/// in `file`. `known`: all channels that some witness may record; `foreign`: names of the
+/// scenario's foreign witnesses.
+void CheckFigures(const std::vector<FigureSpec>& figures, const std::vector<Channel>& known,
+                  const std::vector<std::string>& foreign, const std::string& file,
+                  Diagnostics* diagnostics);
 
 }  // namespace mbv

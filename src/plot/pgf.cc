@@ -1,4 +1,4 @@
-#include "plot/pgf.h"
+#include "plot/draw.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

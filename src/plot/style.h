@@ -73,7 +73,7 @@ struct ShownUnit {
   double factor = 1.0;  ///< shown = factor · SI
 };
 
-/// The unit `name` of what is recorded in `si`; null if there is none of this name.
+/// The unit `name` of what is recorded in `si`; null if no unit has this name.
 [[nodiscard]] const ShownUnit* FindUnit(const std::string& si, const std::string& name);
 /// The names of all units of what is recorded in `si`; at least itself.
 [[nodiscard]] std::vector<std::string> UnitsOf(const std::string& si);

@@ -20,7 +20,7 @@ inline constexpr const char* kSvgNamespace = "http://www.w3.org/2000/svg";
 /// name="value".
 struct SvgAttribute {
   SvgAttribute(const char* key, std::string_view text) : name(key), value(EscapeMarkup(text)) {}
-  /// In pixels, rounded to so many decimals.
+  /// In pixels, rounded to this many decimals.
   SvgAttribute(const char* key, double number, int decimals)
       : name(key), value(fmt::format("{:.{}f}", number, decimals)) {}
   /// As short as it can be written.

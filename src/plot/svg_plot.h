@@ -61,9 +61,9 @@ struct BarRow {
   std::vector<std::array<double, 2>> intervals = {};
 };
 struct BarPlot {
-  std::string title;                 ///< for readers who do not see the bars
-  std::vector<std::string> columns;  ///< what the bars of each column show
-  std::vector<BarRow> rows;
+  std::string title;                      ///< for readers who do not see the bars
+  std::vector<std::string> columns = {};  ///< what the bars of each column show
+  std::vector<BarRow> rows = {};
   size_t shown = 24;  ///< rows that are drawn, to the scale of all
 };
 

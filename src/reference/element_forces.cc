@@ -246,7 +246,6 @@ RunSummary LoadShared(const Mechanism& mechanism, size_t element) {
                                  "redundant constraints share it",
                                  Described(mechanism, at), at.name),
           .where = at.name,
-          .unit = {},
           .names_where = true};
 }
 
@@ -282,7 +281,6 @@ RunSummary LoadSystem::Solve(VecX* n) const {
               "friction by the joints' loads is not determined: a load grows by {:.3g} of what it "
               "causes (less than 1 has one solution): smaller coefficients or radii are needed",
               q),
-          .where = {},
           .amount = q,
           .unit = std::string("1")};
 }

@@ -1,12 +1,10 @@
 #include "reference/force_solver.h"
 
 #include <fmt/format.h>
-#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
-#include "base/demand.h"
 #include "kinematics/constraints.h"
 #include "kinematics/tree_motion.h"
 #include "math/spatial.h"

@@ -11,10 +11,8 @@
 #include "mechanism/channels.h"
 #include "mechanism/motion.h"
 #include "reference/closure_solver.h"
-#include "reference/force_solver.h"
 #include "reference/free_motion.h"
 #include "reference/sample_recorder.h"
-#include "reference/square_system.h"
 
 namespace mbv {
 namespace {
@@ -31,7 +29,7 @@ enum class Pass { kMain, kLooser, kDisturbed };
 
 Effort EffortOf(const ForwardOptions& options, size_t samples, Pass pass) {
   const long most = 4 * static_cast<long>(samples) + options.spare_steps;
-  Effort effort{.most_steps = pass == Pass::kMain ? most : 2 * most, .progress = {}};
+  Effort effort{.most_steps = pass == Pass::kMain ? most : 2 * most};
   if (!options.progress) return effort;
   const double parts = options.measure_trust ? 3.0 : 1.0;
   effort.progress = [report = options.progress, parts, pass](double fraction) {

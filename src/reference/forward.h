@@ -36,9 +36,9 @@ struct ForwardOptions {
 /// A singular pose that the motion passed or came close to.
 struct SingularityCrossing {
   double time_s = kNan;
-  double pivot = kNan;  ///< weakest constraint there over its largest value in this run
-  std::string joint;    ///< moves most in the momentary DOF
-  bool passed = false;  ///< the pivot vanishes there to within the search
+  double pivot = kNan;     ///< weakest constraint there over its largest value in this run
+  std::string joint = {};  ///< moves most in the momentary DOF
+  bool passed = false;     ///< the pivot vanishes there to within the search
 };
 
 struct ForwardRun {

@@ -6,7 +6,6 @@
 
 #include "base/demand.h"
 #include "kinematics/constraints.h"
-#include "math/spatial.h"
 #include "mechanism/reach.h"
 #include "reference/closure_solver.h"
 #include "reference/element_forces.h"
@@ -173,8 +172,8 @@ RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
   summary.unit = std::string("1");
   summary.message = fmt::format(
       "the loops lose a constraint at this pose: in addition to the {} degree{} of freedom of the "
-      "mechanism, {} "
-      "moves freely there, so the way on is not determined (relative pivot {:.1e})",
+      "mechanism, {} is uncontrolled there, so the way on is not determined (relative pivot "
+      "{:.1e})",
       dofs_ + static_cast<int>(motion_.commands.size()),
       dofs_ + motion_.commands.size() == 1 ? "" : "s", summary.where, pivot_);
   return summary;
@@ -194,8 +193,7 @@ RunSummary FreeDynamics::CheckDofs(double t_s) const {
   summary.unit = std::string("1");
   summary.message = fmt::format(
       "the loops and commands leave fewer than the {} degrees of freedom that have initial values: "
-      "the home "
-      "pose was singular, or a command contradicts another (relative pivot {:.1e})",
+      "the home pose was singular, or a command contradicts another (relative pivot {:.1e})",
       dofs_, summary.amount);
   return summary;
 }

@@ -61,8 +61,8 @@ class Hermite {
 struct FrictionPhase {
   std::vector<int> sign;     ///< per force element: of the rate with which it slides; otherwise 0
   std::vector<size_t> held;  ///< those that stick, increasing …
-  std::vector<double> at;    ///< … and the values of their coordinates [m or rad]
-  std::vector<size_t> led;   ///< those whose rate gives their sign
+  std::vector<double> at = {};     ///< … and the values of their coordinates [m or rad]
+  std::vector<size_t> prescribed;  ///< those whose rate gives their sign
 };
 
 class FreeDynamics {
@@ -136,7 +136,7 @@ class FreeDynamics {
   /// The least of the motions left that changes held coordinates by `amount`.
   [[nodiscard]] VecX MotionOfHeld(const MatX& rows, const VecX& amount) const;
   void FillRest(const BodyStates& states, const VecX& A_p, const MatX& R);
-  /// FrictionPhase::sign, with those of what is led.
+  /// FrictionPhase::sign, with those of what is prescribed.
   [[nodiscard]] std::vector<int> SignsAt(const BodyStates& states) const;
   /// All that bears forces that are not given: reactions, drives, prescribed joints, what is held.
   struct ForceRows {

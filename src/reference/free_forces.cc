@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "base/demand.h"
 #include "kinematics/constraints.h"
-#include "math/spatial.h"
 #include "reference/element_forces.h"
 #include "reference/force_solver.h"
 #include "reference/free_dynamics.h"
@@ -78,10 +76,10 @@ FreeDynamics::ForceRows FreeDynamics::ForceRowsAt(const BodyStates& states, bool
 std::vector<int> FreeDynamics::SignsAt(const BodyStates& states) const {
   std::vector<int> sign = phase_.sign;
   if (sign.empty()) sign.assign(mechanism_.elements.size(), 0);  // before the first phase
-  if (phase_.led.empty()) return sign;
+  if (phase_.prescribed.empty()) return sign;
   std::vector<int> signs;
   FrictionDirections(mechanism_, states, motion_.duration_s, &signs);
-  for (const size_t e : phase_.led) sign[e] = signs[e];
+  for (const size_t e : phase_.prescribed) sign[e] = signs[e];
   return sign;
 }
 
@@ -275,7 +273,7 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
 void FreeDynamics::FindLedBands(const ForceRows& at, ReferenceSample* sample) const {
   sample->drive_band = VecX::Zero(sample->drive_force.size());
   sample->prescribed_band = VecX::Zero(sample->prescribed_force.size());
-  if (phase_.led.empty()) return;
+  if (phase_.prescribed.empty()) return;
   std::vector<int> held_too = sample->friction_signs;
   for (const size_t e : phase_.held) held_too[e] = 1;
   const int drives = at.first_prescribed - at.first_driven;

@@ -22,15 +22,15 @@ namespace {
 constexpr int kRateLooks = 16, kLoadLooks = 4;
 // Held elements start where the load exceeds what friction takes by more than round-off.
 constexpr double kExceeds = 1e-11;
-// A rate counts as zero within so many tolerances of a step [characteristic lengths/s, rad/s].
+// A rate counts as zero within this many tolerances of a step [characteristic lengths/s, rad/s].
 constexpr double kUnresolved = 10.0;
 // What starts is decided by the load that the held motion has this share of a step later: at the
 // start itself nothing moves yet.
 constexpr double kAhead = 1e-4;
-// A coordinate of which loops and commands leave a smaller share to forces is led by them, or
-// stands at its dead centre.
-constexpr double kLed = 1e-9;
-// Where it is led, it is also led at a pose that is so far away [rad, characteristic lengths].
+// A coordinate of which loops and commands leave a smaller share to forces is prescribed by them,
+// or stands at its dead centre.
+constexpr double kPrescribed = 1e-9;
+// Where it is, it is so at a pose this far away as well [rad, characteristic lengths].
 constexpr double kAside = 1e-2;
 // A smaller share of what a rate or an acceleration is made of is none.
 constexpr double kTurns = 1e-9;
@@ -109,7 +109,7 @@ RunSummary FreeMotion::Contradiction(size_t element, const std::string& what, do
 // At its dead centre a coordinate is at rest, as loops and commands have it, but forces neither
 // move nor hold it: its share there is round-off of the pose.
 bool FreeMotion::AtDeadCentre(const ScalarRow& row) const {
-  return dynamics_.ShareLeft(row) < kLed;
+  return dynamics_.ShareLeft(row) < kPrescribed;
 }
 
 // Its rate is within the error of DOFs at rest, or, at a dead centre, within round-off.
@@ -120,25 +120,26 @@ bool FreeMotion::Rests(size_t element, const ScalarRow& row) const {
   return std::abs(RateOf(row, V_WB)) <= least;
 }
 
-// Elements whose coordinate loops and commands lead, at this pose and beside it.
-std::vector<size_t> FreeMotion::LedElements() {
-  std::vector<size_t> led;
-  const auto keep_led = [&](const BodyStates& states, std::vector<size_t> of) {
+// Elements whose coordinate loops and commands prescribe, at this pose and next to it.
+std::vector<size_t> FreeMotion::PrescribedElements() {
+  std::vector<size_t> prescribed;
+  const auto keep_prescribed = [&](const BodyStates& states, std::vector<size_t> of) {
     const std::vector<ScalarRow> rows = ElementRows(mechanism_, states);
     std::erase_if(of, [&](size_t e) { return !AtDeadCentre(rows[e]); });
     return of;
   };
   dynamics_.Factor(now_.time_s, now_.states);
-  led = keep_led(now_.states, friction_elements_);
+  prescribed = keep_prescribed(now_.states, friction_elements_);
   VecX aside = dynamics_.Motions() * VecX::Ones(dynamics_.dofs());
   aside *= kAside / SizeOf(aside, dynamics_.length());
   for (const double sense : {1.0, -1.0}) {
-    if (led.empty()) break;
+    if (prescribed.empty()) break;
     BodyStates states = now_.states;
     MoveBodies(sense * aside, &states);
-    if (dynamics_.Project(now_.time_s, &states).ok()) led = keep_led(states, led);
+    if (dynamics_.Project(now_.time_s, &states).ok())
+      prescribed = keep_prescribed(states, prescribed);
   }
-  return led;
+  return prescribed;
 }
 
 // Elements whose coordinate moves by forces are at rest where their rate does not differ from zero;
@@ -147,8 +148,9 @@ RunSummary FreeMotion::BeginFriction() {
   FrictionEvent start;
   FrictionPhase phase;
   phase.sign.assign(mechanism_.elements.size(), 0);
-  phase.led = LedElements();
-  std::erase_if(friction_elements_, [&](size_t e) { return std::ranges::count(phase.led, e) > 0; });
+  phase.prescribed = PrescribedElements();
+  std::erase_if(friction_elements_,
+                [&](size_t e) { return std::ranges::count(phase.prescribed, e) > 0; });
   dynamics_.Factor(0.0, now_.states);
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
   for (const size_t e : friction_elements_) {
@@ -181,7 +183,7 @@ RunSummary FreeMotion::CheckFriction() {
     if (std::isnan(load)) {
       return Contradiction(held, "and others share their load at rest in too many ways", kNan, "");
     }
-    const FrictionEvent event{.after_s = 0.0, .stops = {}, .starts = true};
+    const FrictionEvent event{.after_s = 0.0, .starts = true};
     if (RunSummary summary = Settle(event, dt_); !summary.ok()) return summary;
     if (dynamics_.phase().held.empty()) return RunSummary::Done();
   }
@@ -211,7 +213,7 @@ RunSummary FreeMotion::AcceptWithFriction(const State& x, double t_s, double tri
 
 std::optional<FreeMotion::FrictionEvent> FreeMotion::FirstEvent(const State& from, double h,
                                                                 const State& to) {
-  FrictionEvent first{.after_s = 2.0 * h, .stops = {}, .starts = false};
+  FrictionEvent first{.after_s = 2.0 * h, .starts = false};
   FindStops(from, h, to, &first);
   if (!dynamics_.phase().held.empty()) FindStart(from, h, to, &first);
   if (first.after_s > h) return {};
@@ -251,7 +253,7 @@ void FreeMotion::FindStops(const State& from, double h, const State& to, Frictio
     }
     const double at = before < 0.0 ? 0.0 : Root(rate, before, beyond);
     if (at > first->after_s) continue;
-    if (at < first->after_s) *first = {.after_s = at, .stops = {}, .starts = false};
+    if (at < first->after_s) *first = {.after_s = at, .starts = false};
     first->stops.push_back(e);
   }
 }
@@ -302,7 +304,7 @@ void FreeMotion::FindStart(const State& from, double h, const State& to, Frictio
   }
   if (!trouble_.ok() || until < 0.0) return;
   const double at = until == 0.0 || looks[0] >= 0.0 ? 0.0 : Root(excess, 0.0, until);
-  if (at < first->after_s) *first = {.after_s = at, .stops = {}, .starts = true};
+  if (at < first->after_s) *first = {.after_s = at, .starts = true};
 }
 
 // All that is at rest: held, just stopped, or too slow to decide; not what has just started.
@@ -310,7 +312,7 @@ FrictionPhase FreeMotion::RestingPhase(const FrictionEvent& event) {
   const FrictionPhase& phase = dynamics_.phase();
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
   dynamics_.Factor(now_.time_s, now_.states);
-  FrictionPhase resting{.sign = phase.sign, .held = {}, .at = {}, .led = phase.led};
+  FrictionPhase resting{.sign = phase.sign, .held = {}, .prescribed = phase.prescribed};
   for (const size_t e : friction_elements_) {
     const auto held = std::ranges::find(phase.held, e);
     const bool stopped = std::ranges::find(event.stops, e) != event.stops.end();
@@ -401,7 +403,7 @@ std::vector<int> FreeMotion::Starting(double t_s, const BodyStates& states, RunS
 // What held it in between would decide by the loads of another motion.
 bool FreeMotion::PassesThrough(const FrictionPhase& resting, const std::vector<size_t>& stopping) {
   const FrictionPhase before = dynamics_.phase();
-  FrictionPhase after{.sign = resting.sign, .held = {}, .at = {}, .led = resting.led};
+  FrictionPhase after{.sign = resting.sign, .held = {}, .prescribed = resting.prescribed};
   for (size_t k = 0; k < resting.held.size(); ++k) {
     const size_t e = resting.held[k];
     if (std::ranges::count(stopping, e) > 0) {
@@ -470,7 +472,7 @@ RunSummary FreeMotion::DecideResting(const FrictionPhase& next, bool starts, dou
       if (std::abs(rate) > least) sign[k] = rate > 0.0 ? 1 : -1;
     }
   }
-  FrictionPhase phase{.sign = next.sign, .held = {}, .at = {}, .led = next.led};
+  FrictionPhase phase{.sign = next.sign, .held = {}, .prescribed = next.prescribed};
   for (size_t k = 0; k < sign.size(); ++k) {
     const size_t e = next.held[k];
     phase.sign[e] = sign[k];

@@ -671,7 +671,7 @@ SingularityCrossing FreeMotion::Closest(double first_s, double last_s, const Sta
     }
   }
   const double t_s = 0.5 * (a + b);
-  SingularityCrossing crossing{.time_s = t_s, .pivot = pivot_at(t_s), .joint = {}};
+  SingularityCrossing crossing{.time_s = t_s, .pivot = pivot_at(t_s)};
   crossing.joint = dynamics_.SoftJoint(states);
   return crossing;
 }

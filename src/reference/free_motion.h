@@ -33,8 +33,8 @@ namespace mbv::internal {
 
 /// How long an integration may take, and where its progress is reported.
 struct Effort {
-  long most_steps = 0;                            ///< tried ones included
-  std::function<void(double fraction)> progress;  ///< of the motion's duration; may be empty
+  long most_steps = 0;                                 ///< tried ones included
+  std::function<void(double fraction)> progress = {};  ///< of the motion's duration; may be empty
 };
 
 class FreeMotion {
@@ -99,7 +99,7 @@ class FreeMotion {
   // What ends a phase of friction: some elements come to rest, or what is held starts.
   struct FrictionEvent {
     double after_s = 0.0;
-    std::vector<size_t> stops;
+    std::vector<size_t> stops = {};
     bool starts = false;
   };
   [[nodiscard]] RunSummary BeginFriction();
@@ -111,7 +111,7 @@ class FreeMotion {
   void FindStart(const State& from, double h, const State& to, FrictionEvent* first);
   [[nodiscard]] bool AtDeadCentre(const ScalarRow& row) const;
   [[nodiscard]] bool Rests(size_t element, const ScalarRow& row) const;
-  [[nodiscard]] std::vector<size_t> LedElements();
+  [[nodiscard]] std::vector<size_t> PrescribedElements();
   [[nodiscard]] RunSummary LeaveDeadCentres(FrictionPhase* resting);
   void FollowDeadCentres();
   [[nodiscard]] bool PassesThrough(const FrictionPhase& resting,
@@ -138,7 +138,7 @@ class FreeMotion {
   /// The component of a load that changes at once about now_.
   [[nodiscard]] std::optional<LoadJump> JumpHere();
   [[nodiscard]] RunSummary TooManySteps() const;
-  /// Every so many steps: whether the springs let the rest be done with the steps that are left.
+  /// Every this many steps: whether the springs let the rest be done with the steps that are left.
   [[nodiscard]] RunSummary LookAhead();
   template <typename StatesAt>
   [[nodiscard]] SingularityCrossing Closest(double first_s, double last_s,

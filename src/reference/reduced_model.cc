@@ -10,7 +10,6 @@
 #include "reference/closure_solver.h"
 #include "reference/element_forces.h"
 #include "reference/force_solver.h"
-#include "reference/motion_equations.h"
 #include "reference/sample_recorder.h"
 #include "reference/square_system.h"
 
@@ -32,7 +31,7 @@ std::vector<Command> CommandsOf(const std::vector<Coordinate>& coordinates) {
   std::vector<Command> commands;
   commands.reserve(coordinates.size());
   for (const Coordinate& coordinate : coordinates) {
-    commands.push_back({.name = "", .terms = {{coordinate, 1.0}}, .profile = {}});
+    commands.push_back({.name = "", .terms = {{coordinate, 1.0}}});
   }
   return commands;
 }

@@ -1,7 +1,6 @@
 #include "reference/row_set.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace mbv::internal {
 

@@ -10,7 +10,6 @@
 
 #include "plot/text_mask.h"
 #include "render/scene.h"
-#include "render/tessellation.h"
 
 namespace mbv::render {
 

@@ -1,9 +1,8 @@
-#include "render/arrangement.h"
+#include "render/stage.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "render/annotations.h"
 #include "render/camera.h"

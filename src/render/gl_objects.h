@@ -19,7 +19,6 @@
 #include "math/triangle_mesh.h"
 #include "render/camera.h"
 #include "render/scene.h"
-#include "render/tessellation.h"
 
 // What is drawn with.
 // clang-format off

@@ -11,7 +11,6 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/named_places.h"
 #include "render/annotations.h"
-#include "render/arrangement.h"
 #include "render/scene.h"
 #include "render/stage.h"
 
@@ -178,7 +177,7 @@ void PaintTexts(const Mechanism& mechanism, const PictureFrame& frame, const rn:
 Diagnostics Check(const PictureOptions& options) {
   Diagnostics found;
   const auto demand = [&found](bool ok, std::string message) {
-    if (!ok) found.Add({.file = {}, .message = std::move(message), .hint = {}});
+    if (!ok) found.Add({.message = std::move(message)});
   };
   for (const int size : options.size_px) {
     demand(size >= 64 && size <= 8192,
@@ -205,12 +204,12 @@ Diagnostics Check(const PictureOptions& options) {
 }
 
 PictureFrame HomeFrame(const Mechanism& mechanism) {
-  return {.X_WB = mechanism.X_WB_home, .drive_forces = {}, .caption = {}};
+  return {.X_WB = mechanism.X_WB_home, .drive_forces = {}};
 }
 
 PictureFrame SampleFrame(const Mechanism& mechanism, const SimulationRun& run, int sample) {
   MBV_DEMAND(sample >= 0 && sample < static_cast<int>(run.X_WB.size()), sample);
-  PictureFrame frame{.X_WB = run.X_WB[sample], .drive_forces = {}, .caption = {}};
+  PictureFrame frame{.X_WB = run.X_WB[sample], .drive_forces = {}};
   for (const Drive& drive : mechanism.drives) {
     const int column = run.trace.Find(Quantity::kForce, drive.name);
     frame.drive_forces.push_back(column < 0 ? kNan : run.trace.values(sample, column));

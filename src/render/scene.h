@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/types.h"
+#include "math/triangle_mesh.h"
 #include "mechanism/mechanism.h"
 #include "render/render.h"
 
@@ -91,5 +92,21 @@ struct Scale {
 
 /// Height (along up) of the water: the top of the world's first shape of material "sea".
 [[nodiscard]] std::optional<double> SeaLevel(const Mechanism& mechanism, const Mat3& R_DW);
+
+// Solids as triangles with normals, in their own frame G.
+
+struct Facets {
+  std::vector<Vec3> points_G = {}, normals_G = {};  ///< [m]; unit vectors
+  std::vector<int> faces = {};                      ///< per point: which face, each smooth
+  std::vector<std::array<int, 3>> triangles = {};   ///< counter-clockwise from outside
+};
+constexpr int kMostFaces = 8;  ///< of a primitive solid
+
+/// A primitive solid, round ones with this many sides; empty for a mesh.
+[[nodiscard]] Facets FacetsOf(const Item& item, int sides);
+/// A mesh with at most `most` triangles, smooth but for its sharp edges.
+[[nodiscard]] Facets FacetsOf(const TriangleMesh& mesh, std::size_t most);
+/// Sides of a circle of this radius that looks round.
+[[nodiscard]] int SidesFor(double radius_px);
 
 }  // namespace mbv::render

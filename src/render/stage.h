@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/run_summary.h"
+#include "mechanism/mechanism.h"
 #include "render/annotations.h"
 #include "render/camera.h"
 #include "render/render.h"
@@ -54,5 +55,25 @@ class Stage {
   [[nodiscard]] virtual RunSummary Draw(const StageContent& content, const Mat3& R_DW,
                                         const Camera& camera, Picture* picture) = 0;
 };
+
+// What all pictures of one call share: orientation, sizes, camera, ground and legend.
+
+struct Arrangement {
+  Mat3 R_DW = Mat3::Identity();
+  Scale scale;
+  Camera camera;
+  StageOptions stage;
+  Vec3 forward_W = Vec3::UnitX();  ///< the camera's direction of view
+};
+
+/// Camera, ground and stage that suit all frames together.
+[[nodiscard]] Arrangement Arrange(const Mechanism& mechanism,
+                                  const std::vector<PictureFrame>& frames, const Overlay& overlay,
+                                  const PictureOptions& options);
+/// What the marks in the pictures mean.
+[[nodiscard]] std::vector<LegendEntry> LegendOf(const Mechanism& mechanism,
+                                                const Arrangement& arrangement,
+                                                const Overlay& overlay,
+                                                const PictureOptions& options);
 
 }  // namespace mbv::render

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "base/demand.h"
+#include "base/files.h"
 #include "base/markup.h"
-#include "base/names.h"
 #include "base/text.h"
 #include "report/page.h"
 

@@ -8,14 +8,11 @@
 #include "base/markup.h"
 #include "base/sha256.h"
 #include "plot/svg_plot.h"
-#include "report/contacts.h"
-#include "report/html_assets.h"
 #include "report/load_figures.h"
-#include "report/motion_tables.h"
 #include "report/page.h"
 #include "report/plot_points.h"
-#include "report/reference_table.h"
 #include "report/result.h"
+#include "report/sections.h"
 #include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"
@@ -214,13 +211,11 @@ std::string ForcePlotsHtml(const PairComparison& pair, const Trace& measured, co
   const std::string y_label = fmt::format("[{}]", axis.unit);
   LinePlot forces{.title = fmt::format("Drive forces, {}", pair.measured),
                   .x_label = "time [s]",
-                  .y_label = y_label,
-                  .lines = {}};
+                  .y_label = y_label};
   LinePlot errors{.title = fmt::format("Drive forces, |{} − {}|", pair.measured, pair.truth),
                   .x_label = "time [s]",
                   .y_label = y_label,
-                  .log_y = true,
-                  .lines = {}};
+                  .log_y = true};
   for (const std::string& drive : axis.subjects) {
     const int column = measured.Find(Quantity::kForce, drive);
     const int other = truth.Find(Quantity::kForce, drive);

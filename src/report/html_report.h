@@ -33,8 +33,8 @@ struct HtmlEquation {
 };
 struct HtmlAudit {
   std::string source;  ///< the paper
-  std::vector<HtmlEquation> rows;
-  std::string note;  ///< why there are no rows
+  std::vector<HtmlEquation> rows = {};
+  std::string note = {};  ///< why there are no rows
 };
 
 struct HtmlInput {
@@ -43,10 +43,10 @@ struct HtmlInput {
   const std::vector<std::vector<Pose>>* X_WB = nullptr;  ///< per sample of the simulation, per
                                                          ///< body; null: the home pose is shown
   std::map<std::string, HtmlPaint> paints;               ///< by a shape's `color`
-  std::vector<HtmlPicture> pictures;                     ///< a few hundred kB in total
+  std::vector<HtmlPicture> pictures = {};                ///< a few hundred kB in total
   std::optional<HtmlAudit> audit;
-  std::vector<std::string> arguments;  ///< of the command line, after the scenario file
-  std::string script_link;             ///< where the page's script is; "": in the page
+  std::vector<std::string> arguments = {};  ///< of the command line, after the scenario file
+  std::string script_link;                  ///< where the page's script is; "": in the page
 };
 
 /// Name of a file with the script that pages may share: its content decides it.

@@ -1,11 +1,9 @@
-#include "report/json.h"
+#include "report/report.h"
 
 #include "base/json_text.h"
-#include "report/contacts.h"
 #include "report/load_figures.h"
-#include "report/motion_tables.h"
-#include "report/report.h"
 #include "report/result.h"
+#include "report/sections.h"
 #include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"

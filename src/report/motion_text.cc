@@ -2,15 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
-#include "report/contacts.h"
 #include "report/html_report.h"
-#include "report/motion_tables.h"
-#include "report/page.h"
 #include "report/plot_points.h"
-#include "report/reference_table.h"
 #include "report/report.h"
+#include "report/sections.h"
 #include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"

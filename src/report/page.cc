@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/demand.h"
 #include "base/markup.h"
-#include "report/html_assets.h"
 
 namespace mbv {
 std::string Escape(std::string_view text) { return EscapeMarkup(text); }
@@ -79,31 +79,13 @@ std::string WordOf(const PageHead& head) {
   return head.word.empty() ? WordsOf(head.verdict).word : Escape(head.word);
 }
 
-std::string HeadHtml(const PageHead& head) {
-  const std::string scripts =
-      head.script_source.empty() ? "" : "; script-src " + head.script_source;
+// The verdict's word beside the title, on its coloured ground.
+std::string BadgeHtml(const PageHead& head) {
+  if (!head.judges) return "";
   return fmt::format(
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
-      "style-src 'unsafe-inline'{}\">\n<meta name=\"color-scheme\" content=\"light dark\">\n"
-      "<link rel=\"icon\" href=\"data:,\">\n<title>{}{} – mbverify</title>\n"
-      "<style>{}</style>\n</head>\n",
-      scripts, Escape(head.title), head.judges ? ": " + WordOf(head) : "", PageStyle());
-}
-
-std::string TopHtml(const PageHead& head) {
-  const VerdictWords words = WordsOf(head.verdict);
-  const std::string sign = fmt::format("<span aria-hidden=\"true\">{}</span> ", words.sign);
-  const std::string badge =
-      head.judges
-          ? fmt::format("<div class=\"badges\"><span class=\"verdict {}\">{}{}</span></div>",
-                        ToText(head.verdict), sign, WordOf(head))
-          : "";
-  return fmt::format(
-      "<header class=\"top\"><div><p class=\"kicker\">{}</p><h1>{}</h1><p class=\"lead\">{}</p>"
-      "</div>{}</header>\n",
-      Escape(head.kicker), Escape(head.title), Escape(head.lead), badge);
+      "<div class=\"badges\"><span class=\"verdict {}\"><span aria-hidden=\"true\">{}</span> "
+      "{}</span></div>",
+      ToText(head.verdict), WordsOf(head.verdict).sign, WordOf(head));
 }
 
 }  // namespace
@@ -118,11 +100,37 @@ void Page::Add(const std::string& title, const std::string& link, const std::str
 }
 
 std::string Page::Write(const PageHead& head) const {
-  return HeadHtml(head) + "<body>\n<a class=\"skip\" href=\"#main\">Skip to the " +
-         (head.judges ? "verdict" : "numbers") + "</a>\n" + TopHtml(head) +
-         "<nav aria-label=\"Sections\">\n" + navigation_ + "</nav>\n<main id=\"main\">\n" +
-         sections_ + "</main>\n<footer>" + Escape(head.footer) + "</footer>\n" + head.scripts +
-         "</body>\n</html>\n";
+  const std::string policy = head.script_source.empty() ? "" : "; script-src " + head.script_source;
+  const std::string title = Escape(head.title), kicker = Escape(head.kicker);
+  const std::string lead = Escape(head.lead), footer = Escape(head.footer);
+  const std::string verdict = head.judges ? ": " + WordOf(head) : "", badge = BadgeHtml(head);
+  return FillPage(PageSkeleton(), {{"script_policy", policy},
+                                   {"title", title},
+                                   {"verdict", verdict},
+                                   {"style", PageStyle()},
+                                   {"main", head.judges ? "verdict" : "numbers"},
+                                   {"kicker", kicker},
+                                   {"lead", lead},
+                                   {"badge", badge},
+                                   {"navigation", navigation_},
+                                   {"sections", sections_},
+                                   {"footer", footer},
+                                   {"scripts", head.scripts}});
+}
+
+std::string FillPage(std::string_view skeleton,
+                     const std::map<std::string_view, std::string_view>& values) {
+  std::string page;
+  for (size_t at = 0; at < skeleton.size();) {
+    const size_t begin = std::min(skeleton.find("{{", at), skeleton.size());
+    page += skeleton.substr(at, begin - at);
+    if (begin == skeleton.size()) break;
+    const size_t end = skeleton.find("}}", begin);
+    MBV_DEMAND(end != std::string_view::npos, begin);
+    page += values.at(skeleton.substr(begin + 2, end - begin - 2));
+    at = end + 2;
+  }
+  return page;
 }
 
 }  // namespace mbv

@@ -1,6 +1,7 @@
 // The skeleton of a page: one file of HTML with head, badge, navigation, sections and footer.
 #pragma once
 
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,9 +10,9 @@
 #include "comparison/comparison.h"
 #include "report/document.h"
 
-// Pieces of HTML: escaped text, tables, base64.
-
 namespace mbv {
+
+// Pieces of HTML: escaped text, tables, base64.
 
 /// Text that is safe between tags and in quoted attributes.
 [[nodiscard]] std::string Escape(std::string_view text);
@@ -68,5 +69,16 @@ class Page {
  private:
   std::string navigation_, sections_;
 };
+
+// The skeleton (page.html with {{places}} to fill), script and style of report.html, bundled from
+// web/ when the program is built.
+
+[[nodiscard]] std::string_view PageSkeleton();
+[[nodiscard]] std::string_view PageScript();
+[[nodiscard]] std::string_view PageStyle();
+
+/// A skeleton with its {{places}} filled; each must have a value, which is HTML.
+[[nodiscard]] std::string FillPage(std::string_view skeleton,
+                                   const std::map<std::string_view, std::string_view>& values);
 
 }  // namespace mbv

@@ -4,11 +4,14 @@
 // `schema`.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "base/inputs.h"
 #include "base/run_summary.h"
 #include "comparison/comparison.h"
 #include "comparison/contact_load.h"
@@ -44,7 +47,7 @@ struct EngineError {
 /// How far a free motion with dry friction is off where MuJoCo's own frictionloss does all of it.
 struct FrictionError {
   double step_s = kNan;
-  std::string check, unit;            ///< of the motion: what it misses farthest, as a share of …
+  std::string check = {}, unit = {};  ///< of the motion: what it misses farthest, as a share of …
   double value = kNan, limit = kNan;  ///< … its limit
   std::string failure = {};           ///< why it gave nothing; "" if it ran
 
@@ -132,5 +135,21 @@ struct Report : ResultFrame {
 /// mechanisms' force signals and the reactions that were compared.
 [[nodiscard]] std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism,
                                                 const Comparison& comparison);
+
+// traces.csv in pieces.
+
+/// ToCsv() piece by piece, in their order: the whole text may be larger than all that it is made
+/// of.
+void WriteCsv(const Report& report, const std::function<void(std::string_view)>& write);
+
+/// What the columns of traces.csv are, as CSV on the Web [W3C 2015] has it: name, unit, quantity,
+/// subject and frame of each.
+[[nodiscard]] std::string CsvMetadata(const Report& report);
+inline constexpr const char* kCsvMetadataFile = "traces.csv-metadata.json";
+
+// inputs.json: which files a run read.
+
+/// {schema, inputs: [{file, fingerprint}]}.
+[[nodiscard]] std::string ToJson(const std::vector<InputFile>& inputs);
 
 }  // namespace mbv

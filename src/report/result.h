@@ -159,7 +159,7 @@ void AddBreakdown(const ResultView& view, const RunSummary& summary, nlohmann::o
                                       const std::string& about);
 /// Every check, failed ones first; `note` (HTML) says how to read them.
 [[nodiscard]] std::string ChecksHtml(const ResultView& view, const std::string& note);
-/// Witnesses that did not run, and what was not compared. Where the verdict's reason tells the
+/// Witnesses that did not run, and what was not compared. Where the verdict's reason states the
 /// first failure, it is not said again.
 [[nodiscard]] std::string GapsHtml(const ResultView& view, bool reason_tells_failure = false);
 /// `sources`: also where values come from.

@@ -29,4 +29,13 @@ struct StatedNumber {
 /// What the run asks of each motor; no rows without motors.
 [[nodiscard]] Table SizingTable(const Report& report);
 
+// The mobility report of `mbverify model` as text and as JSON.
+
+/// Lines for the terminal.
+[[nodiscard]] std::string MobilityText(const Mechanism& mechanism, const MobilityReport& report);
+
+/// JSON, schema "mbverify.model/1": name, file, bodies, joints, DOFs, loops, redundant
+/// constraints, undetermined forces.
+[[nodiscard]] std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& report);
+
 }  // namespace mbv

@@ -7,7 +7,6 @@
 
 #include "plot/svg_plot.h"
 #include "report/page.h"
-#include "report/plot_points.h"
 
 namespace mbv {
 namespace {
@@ -72,7 +71,7 @@ Table FiguresTable(const std::vector<const MotorLoad*>& loads) {
 // A limit over speed: its curve, or the constant up to the highest speed.
 PlotLine CurveOf(const Motor& motor, bool peak, double top_speed) {
   const std::vector<CurvePoint>& curve = peak ? motor.peak_curve : motor.continuous_curve;
-  PlotLine line{.label = peak ? "peak" : "continuous", .points = {}};
+  PlotLine line{.label = peak ? "peak" : "continuous"};
   if (!curve.empty()) {
     for (const CurvePoint& point : curve) line.points.emplace_back(point.speed, point.torque);
   } else if (const double torque = peak ? motor.peak : motor.continuous; std::isfinite(torque)) {
@@ -86,9 +85,8 @@ PlotLine CurveOf(const Motor& motor, bool peak, double top_speed) {
 std::string CloudHtml(const Motor& motor, const MotorLoad& load) {
   LinePlot plot{.title = load.drive + ": torque over speed, at the motor",
                 .x_label = "|speed| [" + load.speed_unit + "]",
-                .y_label = "|torque| [" + load.torque_unit + "]",
-                .lines = {}};
-  PlotLine cloud{.label = load.witness, .points = {}};
+                .y_label = "|torque| [" + load.torque_unit + "]"};
+  PlotLine cloud{.label = load.witness};
   const Eigen::Index stride = 1 + load.torque.size() / 1500;
   for (Eigen::Index i = 0; i < load.torque.size(); i += stride) {
     cloud.points.emplace_back(std::abs(load.speed[i]), std::abs(load.torque[i]));

@@ -189,7 +189,7 @@ std::vector<std::string> MeasuredLines(const SourceModelAudit& audit) {
   }
   if (audit.bare.sound()) {
     std::string text = fmt::format(
-        "of it the file's settings alone, with its drives led exactly and without what the "
+        "of it the file's settings alone, with its drives prescribed exactly and without what the "
         "reference does not have: {:.1e}",
         audit.bare.force);
     for (const SourceModelCause& cause : audit.causes) {
@@ -242,8 +242,8 @@ std::string CauseSentence(const SourceModelAudit& audit) {
   }
   if (!audit.searched && audit.Good(audit.bare)) {
     text += fmt::format(
-        " The settings need no change: with the drives led exactly, and without what the reference "
-        "does not have, the force error is {:.1e}.",
+        " The settings need no change: with the drives prescribed exactly, and without what the "
+        "reference does not have, the force error is {:.1e}.",
         audit.bare.force);
   }
   return text;
@@ -267,13 +267,14 @@ Table CauseTable(const SourceModelAudit& audit) {
 
 std::vector<std::string> SearchLines(const SourceModelAudit& audit) {
   if (!audit.searched) return {};
-  std::vector<std::string> lines = {fmt::format(
-      "{} of {} settings were run{}; of each the file's drives are led exactly, and what the "
-      "reference does not have is left out, so that nothing but settings is judged",
-      audit.trials.size(), audit.planned,
-      std::isnan(audit.budget_s)
-          ? ""
-          : fmt::format(", which took the {:g} s that it may take", audit.budget_s))};
+  std::vector<std::string> lines = {
+      fmt::format("{} of {} settings were run{}; of each the file's drives are prescribed exactly, "
+                  "and what the "
+                  "reference does not have is left out, so that nothing but settings is judged",
+                  audit.trials.size(), audit.planned,
+                  std::isnan(audit.budget_s)
+                      ? ""
+                      : fmt::format(", which took the {:g} s that it may take", audit.budget_s))};
   for (const SourceModelTrial& trial : audit.trials) {
     if (trial.other.empty() || audit.trials.empty()) continue;
     const bool same = trial.error.force == audit.trials[0].error.force;
@@ -311,10 +312,11 @@ std::vector<std::string> PastedLines(const SourceModelAudit& audit) {
     lines.push_back("run with these lines in it, the file gives nothing: " + audit.pasted.failure);
     return lines;
   }
-  lines.push_back(fmt::format(
-      "run with these lines in it, its drives led exactly and without what the reference does not "
-      "have, the file gives a force error of {:.2e} and a loop gap of {:.1e} m",
-      audit.pasted.force, audit.pasted.gap_m));
+  lines.push_back(
+      fmt::format("run with these lines in it, its drives prescribed exactly and without what the "
+                  "reference does not "
+                  "have, the file gives a force error of {:.2e} and a loop gap of {:.1e} m",
+                  audit.pasted.force, audit.pasted.gap_m));
   const SourceModelError& own = audit.pasted_as_is;
   lines.push_back(
       own.sound() ? fmt::format("run with these lines in it and nothing else changed: force "

@@ -69,8 +69,8 @@ struct SourceModelAudit {
   /// The same with loops ten times softer than MuJoCo's limit, where `corrected` is not good: what
   /// the limit itself costs.
   SourceModelError softer;
-  /// As the file, with its drives led exactly and without what the reference does not have: what
-  /// its settings alone do. Only where `as_is` is not good.
+  /// As the file, with its drives prescribed exactly and without what the reference does not have:
+  /// what its settings alone do. Only where `as_is` is not good.
   SourceModelError bare;
   bool searched = false;
   std::vector<SourceModelTrial> trials;  ///< the file's own settings first
@@ -79,7 +79,7 @@ struct SourceModelAudit {
   int recommended = -1;                  ///< of the trials
   std::string lines;                     ///< to paste
   std::vector<std::string> stubborn;     ///< closures that state settings of their own
-  SourceModelError pasted;               ///< with the lines in the file, led as `bare` is
+  SourceModelError pasted;               ///< with the lines in the file, driven as `bare` is
   SourceModelError pasted_as_is;         ///< with the lines in the file and nothing else changed
   double seconds = 0.0;                  ///< all of this
 

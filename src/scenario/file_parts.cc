@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "base/names.h"
+#include "base/files.h"
 #include "base/text.h"
 #include "scenario/load_scenario.h"
 

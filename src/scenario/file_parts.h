@@ -20,7 +20,7 @@ namespace mbv {
 /// "sea_state", or "must_fail/wrong_mass" for a file in a folder below one named as the mechanism.
 [[nodiscard]] std::string CaseName(const std::filesystem::path& file, const std::string& mechanism);
 
-/// A finding if a part of a scenario's name breaks the rule of names (base/names.h): it becomes a
+/// A finding if a part of a scenario's name breaks the rule of names (base/files.h): it becomes a
 /// folder.
 void CheckCaseName(const std::string& name, YamlReader* yaml);
 

@@ -22,9 +22,7 @@
 #include "model_file/yaml/value_reader.h"
 #include "scenario/file_parts.h"
 #include "scenario/find_model.h"
-#include "scenario/motion_reader.h"
-#include "scenario/settings_reader.h"
-#include "scenario/snapshots_reader.h"
+#include "scenario/section_readers.h"
 #include "scenario/tables/table.h"
 
 namespace mbv {
@@ -392,8 +390,9 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     std::string hint;
     for (const Spin& spin : FindSpins(*mechanism_)) {
       if (spin.why_not.empty()) continue;
-      hint += fmt::format("; the spin of {} about the line through its balls is not idle: {}",
-                          spin.name, spin.why_not);
+      hint += fmt::format(
+          "; the spin of {} about the line through its spherical joints is not idle: {}", spin.name,
+          spin.why_not);
     }
     return hint;
   }
@@ -850,6 +849,12 @@ class WitnessReader {
 };
 
 }  // namespace
+
+Overrides Merge(const Overrides& base, const Overrides& over) {
+  Overrides merged = over;
+  merged.insert(base.begin(), base.end());
+  return merged;
+}
 
 std::vector<ForeignWitness> ReadWitnesses(ValueReader* values, const YamlNode* node,
                                           const std::string& folder) {

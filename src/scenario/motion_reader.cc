@@ -1,8 +1,7 @@
-#include "scenario/motion_reader.h"
+#include "scenario/section_readers.h"
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <string>
@@ -11,13 +10,10 @@
 #include "base/text.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility.h"
-#include "math/channel.h"
-#include "math/spatial.h"
 #include "mechanism/followed_state.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "model_file/yaml/value_reader.h"
-#include "scenario/profile_reader.h"
 #include "scenario/tables/motion_table.h"
 
 namespace mbv {
@@ -38,7 +34,7 @@ std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism) {
 }
 
 Command AsCommand(const std::string& name, const Coordinate& coordinate) {
-  return {.name = name, .terms = {{coordinate, 1.0}}, .profile = {}};
+  return {.name = name, .terms = {{coordinate, 1.0}}};
 }
 
 class FreeMotionReader {
@@ -514,7 +510,7 @@ class MotionReader {
   [[nodiscard]] std::optional<std::string> JointHint(const std::string& name) const {
     for (const NamedCoordinate& named : NamedJointCoordinates(mechanism_)) {
       if (named.name != name) continue;
-      return "a rotation of a ball has no axis that a command could be about: command "
+      return "a rotation of a spherical joint has no axis that a command could be about: command "
              "OUTPUT.roll, OUTPUT.pitch or OUTPUT.yaw of an output on its body";
     }
     const int j = mechanism_.FindJoint(name);
@@ -651,7 +647,7 @@ class MotionReader {
                      "v_max and a_max are in m/s and m/s²; command angles under motion.commands");
         continue;
       }
-      axes.push_back({.name = item->text, .terms = {{*coordinate, 1.0}}, .profile = {}});
+      axes.push_back({.name = item->text, .terms = {{*coordinate, 1.0}}});
     }
     return axes.size() == items->size() ? axes : std::vector<Command>{};
   }

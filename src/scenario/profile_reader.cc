@@ -1,4 +1,4 @@
-#include "scenario/profile_reader.h"
+#include "scenario/section_readers.h"
 
 #include <fmt/format.h>
 #include <algorithm>

@@ -109,7 +109,7 @@ struct SnapshotSettings {
   std::array<int, 2> size_px{1280, 960};
   CameraSettings camera;
   int path_output = -1;  ///< output whose path through the whole motion is drawn; -1: none
-  /// Other instants drawn pale into each picture [s]; or so many between the start and its own.
+  /// Other instants drawn pale into each picture [s]; or this many between the start and its own.
   std::vector<double> ghost_times_s;
   int ghost_count = 0;
   std::string background;           ///< "transparent" or a colour; "": sky and ground
@@ -126,14 +126,6 @@ struct Expectation {
 };
 
 struct Scenario {
-  // Compiled once (scenario.cc): each file that copies one would do so again.
-  Scenario();
-  ~Scenario();
-  Scenario(const Scenario&);
-  Scenario& operator=(const Scenario&);
-  Scenario(Scenario&&) noexcept;
-  Scenario& operator=(Scenario&&) noexcept;
-
   std::string file;  ///< as given
   std::string name;  ///< file name without its ending, "must_fail/x" below a model's folder
   std::string description;

@@ -1,10 +1,9 @@
-#include "scenario/settings_reader.h"
+#include "scenario/section_readers.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/text.h"
 #include "mechanism/reach.h"

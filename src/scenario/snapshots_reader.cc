@@ -1,11 +1,11 @@
-#include "scenario/snapshots_reader.h"
+#include "scenario/section_readers.h"
 
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "base/names.h"
+#include "base/files.h"
 #include "base/text.h"
 #include "mechanism/colors.h"
 #include "mechanism/named_places.h"

@@ -15,7 +15,7 @@
 #include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
 #include "model_file/yaml/yaml_reader.h"
-#include "report/mobility_text.h"
+#include "report/result_tables.h"
 #include "simulation/engine/engine_model.h"
 #include "simulation/import/read_mjcf.h"
 #include "simulation/mjcf/mjcf.h"
@@ -183,9 +183,7 @@ RunSummary SetForces(const VecX& load, const HomeRows& rows, HomeServos* servos)
     return {.stop = Stop::kUnsupported,
             .message =
                 "the drives cannot hold the home pose: a degree of freedom that they do not drive "
-                "gives way to gravity or springs",
-            .where = {},
-            .unit = {}};
+                "gives way to gravity or springs"};
   }
   const VecX drives = forces.tail(rows.drives.rows());
   servos->force.assign(drives.begin(), drives.end());
@@ -219,9 +217,7 @@ HomeServos TuneHomeServos(const Mechanism& mechanism, double frequency_hz) {
     servos.summary = TuneInEngine(mechanism, frequency_hz, &servos);
   } catch (const simulation::EngineError& error) {
     servos.summary = {.stop = Stop::kEngineFailure,
-                      .message = std::string("MuJoCo: ") + error.what(),
-                      .where = {},
-                      .unit = {}};
+                      .message = std::string("MuJoCo: ") + error.what()};
   }
   return servos;
 }
@@ -247,13 +243,13 @@ std::string ModelText(const Mechanism& mechanism, ModelFormat format,
 
 MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives) {
   if (std::string trouble = mjcf::NestingTrouble(mjcf::MakePlan(mechanism)); !trouble.empty()) {
-    return {.text = {}, .trouble = std::move(trouble)};
+    return {.trouble = std::move(trouble)};
   }
   MjcfOptions options;
   options.prescribed = drives == ModelDrives::kHeld;
   if (drives == ModelDrives::kServo) {
     HomeServos servos = TuneHomeServos(mechanism);
-    if (!servos.summary.ok()) return {.text = {}, .trouble = servos.summary.message};
+    if (!servos.summary.ok()) return {.trouble = servos.summary.message};
     options.kp = std::move(servos.kp);
     options.kv = std::move(servos.kv);
     options.motor_home = std::move(servos.force);

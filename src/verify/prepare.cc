@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include "base/text.h"
-#include "equations/file_form.h"
+#include "equations/equations.h"
 #include "mechanism/channels.h"
 #include "mechanism/followed_state.h"
 #include "model_file/load_model.h"
-#include "plot/check_figures.h"
+#include "plot/figure.h"
 #include "verify/drive_by.h"
 
 namespace mbv {

@@ -51,8 +51,7 @@ std::string JointText(const Joint& joint, int coordinate) {
 
 std::string RangeViolation::Text() const {
   return fmt::format(
-      "at t = {:.6g} s {} needs {:.6g} {}, its range is {:.6g} … {:.6g} {} ({:.3g} "
-      "{} beyond)",
+      "at t = {:.6g} s {} needs {:.6g} {}, its range is {:.6g} … {:.6g} {} ({:.3g} {} beyond)",
       time_s, what, value, unit, range.lower, range.upper, unit, amount, unit);
 }
 

@@ -13,7 +13,7 @@
 #include "analytic/cabin_robot/stiffness.h"
 #include "math/spatial.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 
 inline constexpr double kDeg = std::numbers::pi / 180;
 inline constexpr double kAlgebra = 1e-11;
@@ -143,4 +143,4 @@ inline LimbTruth IntegratedLimb(const StiffnessParameters& p, double alpha, doub
   return truth;
 }
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -5,7 +5,7 @@
 
 #include "tests/analytic/cabin_robot_stiffness_fixture.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 namespace {
 
 TEST(CabinStiffness, BeamComplianceIsTheIntegratedFlexibility) {  // (54)
@@ -242,4 +242,4 @@ TEST(CabinStiffness, ShareOfABeamIsWhatItsSofteningAdds) {
 }
 
 }  // namespace
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -5,7 +5,7 @@
 #include "tests/analytic/cabin_robot_stiffness_fixture.h"
 #include "tests/support/allocation_counter.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 namespace {
 
 /// The 50 loads: 0 … 1000 N and 0 … 1 N m from a 64-bit linear congruential generator.
@@ -172,4 +172,4 @@ TEST(CabinStiffness, EvaluatingAPoseTakesNoMemory) {
 }
 
 }  // namespace
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -11,7 +11,7 @@
 #include "model_file/load_model.h"
 #include "tests/support/source_dir.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 namespace {
 
 constexpr double kDeg = std::numbers::pi / 180.0;
@@ -64,7 +64,7 @@ Motion HoldMotion(double X, double Y, double gamma) {
 
 ClosedFormSample Evaluate(const Mechanism& mechanism, const Motion& motion, double t) {
   Diagnostics diagnostics;
-  const auto form = MakeCabinRobot(mechanism, motion, {}, &diagnostics);
+  const auto form = cabin_robot::MakeClosedForm(mechanism, motion, {}, &diagnostics);
   EXPECT_NE(form, nullptr) << diagnostics.Text();
   CommandSample command;
   EvaluateMotion(motion, t, &command);
@@ -308,7 +308,7 @@ TEST(CabinRobot, ToolPoseWithGivenRailLeadsBackToTheSameDrives) {
     Add(name, Constant(0.0), &tool_motion);
   }
   Diagnostics diagnostics;
-  const auto form = MakeCabinRobot(mechanism, tool_motion, {}, &diagnostics);
+  const auto form = cabin_robot::MakeClosedForm(mechanism, tool_motion, {}, &diagnostics);
   ASSERT_NE(form, nullptr) << diagnostics.Text();
   for (double t : {1.1, 2.0, 3.3}) {
     const ClosedFormSample truth = Evaluate(mechanism, joint_motion, t);
@@ -329,9 +329,9 @@ TEST(CabinRobot, AMotionThatCommandsHalfOfASetIsExplained) {
   Motion motion = HoldMotion(0.0, 0.36, 0.0);
   motion.commands.erase(motion.commands.begin() + 3);
   Diagnostics diagnostics;
-  EXPECT_EQ(MakeCabinRobot(LoadCabin(), motion, {}, &diagnostics), nullptr);
+  EXPECT_EQ(cabin_robot::MakeClosedForm(LoadCabin(), motion, {}, &diagnostics), nullptr);
   EXPECT_NE(diagnostics.Text().find("platform.yaw"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -99,19 +99,20 @@ TEST(CabinReactions, APerturbedLinkIsSeen) {
 
 TEST(CabinReactions, StrutAndHingesOfAMasslessLinkageByHand) {
   // W at K, level: C carries W/2 along CD; B the rest; E the strut's compression.
-  cabin::CabinGeometry g;
+  cabin_robot::CabinGeometry g;
   g.planar = {0.52, 0.42, 0.5, 0.28};
   g.gravity.setZero();
-  cabin::PlanarState s;
+  cabin_robot::PlanarState s;
   s.X = {0.0, 0.0, 0.0};
   s.Y = {0.36, 0.0, 0.0};
-  ASSERT_TRUE(cabin::SolveInverse(g.planar, &s).ok());
-  std::array<cabin::FrameMotion, cabin::kBodies> frames;
-  cabin::ComputeFrames(g, s, {}, &frames);
-  cabin::Demands demands = cabin::DemandsOf(g, frames);
+  ASSERT_TRUE(cabin_robot::SolveInverse(g.planar, &s).ok());
+  std::array<cabin_robot::FrameMotion, cabin_robot::kBodies> frames;
+  cabin_robot::ComputeFrames(g, s, {}, &frames);
+  cabin_robot::Demands demands = cabin_robot::DemandsOf(g, frames);
   constexpr double W = 981.0;
-  cabin::TakeOff({cabin::kPlatform, Vec3::Zero(), Vec3(0, -W, 0), Vec3::Zero()}, frames, &demands);
-  const cabin::HingeForces h = cabin::HingeForcesOf(g, frames, demands);
+  cabin_robot::TakeOff({cabin_robot::kPlatform, Vec3::Zero(), Vec3(0, -W, 0), Vec3::Zero()}, frames,
+                       &demands);
+  const cabin_robot::HingeForces h = cabin_robot::HingeForcesOf(g, frames, demands);
   const double alpha = s.alpha.p, beta = s.beta.p, epsilon = s.epsilon.p;
   constexpr double kRoundoff = 1e-10;
   EXPECT_LT((h.C - W / 2 * Vec3(-1 / std::tan(beta), 1, 0)).norm(), kRoundoff);
@@ -151,10 +152,10 @@ TEST(ScaraReactions, APerturbedConstantIsSeen) {
 TEST(ScaraReactions, RodTensionsAtRestByHand) {
   // Half of each rod's weight goes to each end; force and yaw balance give the four tensions.
   const ScenarioResult loaded = LoadedScenario("scara_robot/static.yaml");
-  const scara::Parameters p = scara::ParametersOf(*loaded.mechanism);
-  scara::Position position;
-  ASSERT_TRUE(scara::InversePosition(p, p.home_X, &position).ok());
-  const auto forces = scara::JointForces(p, position, {}, Vec3(0, 0, -5), 0.0);
+  const scara_robot::Parameters p = scara_robot::ParametersOf(*loaded.mechanism);
+  scara_robot::Position position;
+  ASSERT_TRUE(scara_robot::InversePosition(p, p.home_X, &position).ok());
+  const auto forces = scara_robot::JointForces(p, position, {}, Vec3(0, 0, -5), 0.0);
   const double tension[] = {1.778764, 1.778764, 8.392258, 8.392258};
   const Vec3 half = 0.5 * p.m_rods * p.gravity_W;
   for (int i = 0; i < 4; ++i) {
@@ -167,23 +168,23 @@ TEST(ScaraReactions, RodTensionsAtRestByHand) {
 // The bearing's force and the torque balance the arm: another way to (48).
 TEST(ScaraReactions, TorquesFollowFromTheForcesOnTheArms) {
   const ScenarioResult loaded = LoadedScenario("scara_robot/pick_place.yaml");
-  const scara::Parameters p = scara::ParametersOf(*loaded.mechanism);
+  const scara_robot::Parameters p = scara_robot::ParametersOf(*loaded.mechanism);
   CommandSample command;
   for (const double share : {0.2, 0.5, 0.9}) {
     EvaluateMotion(loaded.scenario->motion, share * loaded.scenario->motion.duration_s, &command);
     ASSERT_EQ(command.position.size(), 4);
-    scara::Position position;
-    scara::Rates rates;
-    ASSERT_TRUE(scara::InversePosition(p, command.position, &position).ok());
+    scara_robot::Position position;
+    scara_robot::Rates rates;
+    ASSERT_TRUE(scara_robot::InversePosition(p, command.position, &position).ok());
     rates.dX = command.velocity;
     rates.ddX = command.acceleration;
-    scara::DriveRates(p, position, &rates);
+    scara_robot::DriveRates(p, position, &rates);
     const Vec3 F(1, -2, -5);
-    const auto forces = scara::JointForces(p, position, rates, F, 0.1);
-    const scara::Vec4 M = scara::DriveTorques(p, position, rates, F, 0.1);
+    const auto forces = scara_robot::JointForces(p, position, rates, F, 0.1);
+    const scara_robot::Vec4 M = scara_robot::DriveTorques(p, position, rates, F, 0.1);
     for (int i = 0; i < 4; ++i) {
-      const Vec3 &u = position.u[size_t(i)], &a = scara::MotorAxis(i);
-      const double I = scara::SolidBar(p.m_arm, p.arm_radius, p.l1).transverse;
+      const Vec3 &u = position.u[size_t(i)], &a = scara_robot::MotorAxis(i);
+      const double I = scara_robot::SolidBar(p.m_arm, p.arm_radius, p.l1).transverse;
       const Vec3 weight = p.m_arm * p.gravity_W;
       // I_A θ̈ = M + (COM × weight)·a − (l1 u × force on the rods)·a
       const double I_A = I + p.m_arm * p.arm_com * p.arm_com * p.l1 * p.l1;

@@ -6,7 +6,7 @@
 #include "tests/analytic/scara_robot_fixture.h"
 #include "tests/support/allocation_counter.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 const Vec3 kToolForce(0, 0, -5);
@@ -398,4 +398,4 @@ TEST(ScaraClosedForm, RefusesMotionsItCannotTake) {
 }
 
 }  // namespace
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -12,7 +12,7 @@
 
 #include "analytic/scara_robot/dynamics.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 inline constexpr double kDeg = std::numbers::pi / 180.0;
 
@@ -139,4 +139,4 @@ inline Instant PickPlaceInstant(const Parameters& parameters, double t_s) {
 inline Vec4 MirrorPose(const Vec4& X) { return {X[1], X[0], X[2], -X[3]}; }
 inline Vec4 MirrorLimbs(const Vec4& v) { return {v[1], v[0], v[3], v[2]}; }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

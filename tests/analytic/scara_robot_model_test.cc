@@ -10,7 +10,7 @@
 #include "tests/analytic/scara_robot_fixture.h"
 #include "tests/support/source_dir.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 const std::string kModelFile = SourcePath("/models/scara_robot/model.yaml");
@@ -205,4 +205,4 @@ TEST(ScaraModel, UnreachableHomeIsRefused) {
 }
 
 }  // namespace
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -2,7 +2,7 @@
 #include "analytic/scara_robot/workspace.h"
 #include "tests/analytic/scara_robot_fixture.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 // Angles come from a few roundings of numbers of order one.
@@ -186,4 +186,4 @@ TEST(ScaraPosition, TopologyGivesThreeTranslationsAndOneRotation) {
 }
 
 }  // namespace
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -10,7 +10,7 @@
 #include "math/spatial.h"
 #include "tests/analytic/scara_robot_fixture.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 /// Steel members of 8 mm and servos of 5000 N m/rad.
 inline StiffnessParameters PaperStiffness() {
@@ -108,4 +108,4 @@ inline MatX DifferentiatedColumns(const Station& station, const Vec3& p_WP) {
   return J;
 }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

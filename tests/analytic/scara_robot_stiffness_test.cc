@@ -8,7 +8,7 @@
 #include "analytic/scara_robot/velocity.h"
 #include "tests/analytic/scara_robot_stiffness_fixture.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 const Mat6 kAll = Mat6::Identity();
@@ -279,4 +279,4 @@ TEST(ScaraStiffness, MirroredPosesHaveMirroredStiffness) {
 }
 
 }  // namespace
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -8,7 +8,7 @@
 #include "tests/analytic/scara_robot_stiffness_fixture.h"
 #include "tests/support/allocation_counter.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 TEST(ScaraStiffness, TheExampleHasTheKnownStiffness) {
@@ -181,4 +181,4 @@ TEST(ScaraStiffness, EvaluatingAPoseTakesNoMemory) {
 }
 
 }  // namespace
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -3,7 +3,7 @@
 
 #include "tests/analytic/scara_robot_fixture.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 /// Sixth-order central difference of f at 0; its round-off is about eps·|f|/h.
@@ -137,4 +137,4 @@ TEST(ScaraVelocity, SingularValuesAlongTheScenariosAreAsDescribed) {
 }
 
 }  // namespace
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -5,7 +5,7 @@
 
 #include "tests/analytic/scara_robot_fixture.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 constexpr int kLayers = 14, kRings = 10, kSpokes = 36;  // layers 10 mm apart
@@ -102,4 +102,4 @@ TEST(ScaraWorkspace, VolumeIsReproducible) {
 }
 
 }  // namespace
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -24,7 +24,7 @@ constexpr double kForceRoundoff_N = 1e4 * kEps * 600;
 
 ClosedFormRun RunTripod(const Mechanism& mechanism, const Motion& motion) {
   Diagnostics diagnostics;
-  const auto closed_form = MakeSprTripod(mechanism, motion, {}, &diagnostics);
+  const auto closed_form = spr_tripod::MakeClosedForm(mechanism, motion, {}, &diagnostics);
   EXPECT_NE(closed_form, nullptr) << diagnostics.Text();
   return RunClosedForm(mechanism, motion, closed_form.get());
 }
@@ -37,7 +37,7 @@ VecX ColumnOf(const Trace& trace, const std::string& name) {
 
 std::string ErrorOf(const Mechanism& mechanism, const Motion& motion) {
   Diagnostics diagnostics;
-  EXPECT_EQ(MakeSprTripod(mechanism, motion, {}, &diagnostics), nullptr);
+  EXPECT_EQ(spr_tripod::MakeClosedForm(mechanism, motion, {}, &diagnostics), nullptr);
   return diagnostics.Text();
 }
 
@@ -45,7 +45,7 @@ TEST(SprTripodClosedForm, IsRegisteredUnderItsName) {
   const ClosedFormRow* row = FindClosedForm("spr_tripod");
   ASSERT_NE(row, nullptr);
   EXPECT_EQ(row->models.front(), "full");
-  EXPECT_EQ(row->factory, &MakeSprTripod);
+  EXPECT_EQ(row->factory, &spr_tripod::MakeClosedForm);
 }
 
 TEST(SprTripodClosedForm, DefaultPathReachesTheTabulatedExtremes) {
@@ -151,7 +151,7 @@ TEST(SprTripodClosedForm, WorkOverARestToRestPathIsThePotentialDifference) {
   // Simpson on each of the three segments: the power is smooth inside them.
   const Mechanism mechanism = TripodByHand();
   Diagnostics diagnostics;
-  const auto closed_form = MakeSprTripod(mechanism, motion, {}, &diagnostics);
+  const auto closed_form = spr_tripod::MakeClosedForm(mechanism, motion, {}, &diagnostics);
   CommandSample command;
   ClosedFormSample sample;
   const auto power = [&](double t) {
@@ -178,7 +178,7 @@ TEST(SprTripodClosedForm, ForcesNearlyVanishInFreeFall) {
   Motion motion = PathMotion(0.0);
   const Mechanism mechanism = TripodByHand();
   Diagnostics diagnostics;
-  const auto closed_form = MakeSprTripod(mechanism, motion, {}, &diagnostics);
+  const auto closed_form = spr_tripod::MakeClosedForm(mechanism, motion, {}, &diagnostics);
   CommandSample command;
   ClosedFormSample sample;
   // Peak of the first 3-4-5 segment: 10 m/s² along gravity's 9.81.
@@ -200,8 +200,8 @@ TEST(SprTripodClosedForm, LegCommandsAndTaskCommandsGiveTheSameForces) {
     legs.commands[k].terms[0].coordinate = {Coordinate::Kind::kDrive, k, 0};
   }
   Diagnostics diagnostics;
-  const auto by_task = MakeSprTripod(mechanism, task, {}, &diagnostics);
-  const auto by_legs = MakeSprTripod(mechanism, legs, {}, &diagnostics);
+  const auto by_task = spr_tripod::MakeClosedForm(mechanism, task, {}, &diagnostics);
+  const auto by_legs = spr_tripod::MakeClosedForm(mechanism, legs, {}, &diagnostics);
   ASSERT_NE(by_legs, nullptr) << diagnostics.Text();
   CommandSample command;
   ClosedFormSample a, b;
@@ -333,7 +333,7 @@ TEST(SprTripodClosedForm, SamplesCostNoAllocation) {
   load.force[2] = Constant(-400);
   motion.loads = {load};
   Diagnostics diagnostics;
-  const auto closed_form = MakeSprTripod(mechanism, motion, {}, &diagnostics);
+  const auto closed_form = spr_tripod::MakeClosedForm(mechanism, motion, {}, &diagnostics);
   CommandSample command;
   ClosedFormSample sample;
   EvaluateMotion(motion, 0.0, &command);

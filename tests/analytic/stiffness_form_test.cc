@@ -21,7 +21,7 @@ struct StiffnessCase {
 
 StiffnessCase ScaraCase() {
   StiffnessCase c{
-      scara::PaperMechanism(),
+      scara_robot::PaperMechanism(),
       {{"platform.x", -0.05}, {"platform.y", -0.05}, {"platform.z", -0.15}, {"platform.yaw", 0.2}}};
   for (const auto& [name, value] : {std::pair{"d", 0.05},
                                     {"E", 210e9},

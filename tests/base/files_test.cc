@@ -100,7 +100,7 @@ TEST_F(FilesTest, AFolderIsNotReplaced) {
   EXPECT_TRUE(fs::exists(file_ / "content"));
 }
 
-TEST_F(FilesTest, NobodyCanLayALinkWhereTheTemporaryFileWillBe) {
+TEST_F(FilesTest, TheTemporaryFileCannotBeALink) {
   // Names are new at each call.
   std::set<std::string> names;
   for (int i = 0; i < 100; ++i) names.insert(RandomLetters());

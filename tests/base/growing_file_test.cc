@@ -89,7 +89,7 @@ TEST(ShareOut, ReportsWhatWasLost) {
   EXPECT_EQ(given, 5u);
 }
 
-TEST(StreamFromChildren, EndsWhenNobodyTakesMore) {
+TEST(StreamFromChildren, EndsWhenTheReaderCloses) {
   size_t taken = 0;
   StreamFromChildren(
       1000000, {.parallel = 3}, [](size_t) { return std::string(1000, 'x'); },

@@ -1,4 +1,4 @@
-#include "base/names.h"
+#include "base/files.h"
 
 #include <gtest/gtest.h>
 

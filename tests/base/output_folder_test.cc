@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "base/files.h"
-#include "base/state_folder.h"
 #include "tests/support/kill_at_calls.h"
 
 namespace mbv {

@@ -27,7 +27,7 @@ TEST(Roles, ARowIsFoundByItsName) {
   EXPECT_FALSE(IsEngine(""));
 }
 
-TEST(Roles, NobodyIsHeldAgainstItself) {
+TEST(Roles, NoRoleIsComparedWithItself) {
   for (const auto& [measured, truth] : kRolePairs) EXPECT_NE(measured, truth);
   for (const auto& [measured, truth] : kMainPairs) {
     EXPECT_TRUE(measured->IsHeldAgainst(*truth)) << PairName(*measured, *truth);

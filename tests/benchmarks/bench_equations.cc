@@ -2,7 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include "base/demand.h"
-#include "equations/file_form.h"
+#include "equations/equations.h"
 #include "scenario/load_scenario.h"
 #include "tests/support/source_dir.h"
 

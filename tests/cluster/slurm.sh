@@ -2,7 +2,7 @@
 # The Slurm example for real: an array of six tasks, of which one is requeued and one killed while
 # they compute, and the merge that waits for them; then shards that must not be merged.
 #   slurm.sh MBVERIFY SOURCE_DIR
-# slurmctld and slurmd run here, in a folder and in name spaces of their own: nobody outside reaches
+# slurmctld and slurmd run here, in a folder and in name spaces of their own: no other process reaches
 # them, and they end with this script however it ends. Where a container forbids name spaces they
 # listen on free ports of 127.0.0.1, and what is left of them is ended by watch_over.
 set -u

@@ -11,7 +11,7 @@ enter_cluster() {  # SCRIPT ARGUMENT…
   exec "$@"
 }
 
-# A port that nobody listens on, below those that the kernel gives away.
+# A port without a listener, below those that the kernel gives away.
 free_port() {
   local port
   while port=$((RANDOM % 12000 + 20000)); (: </dev/tcp/127.0.0.1/$port) 2>/dev/null; do :; done

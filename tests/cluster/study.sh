@@ -60,7 +60,7 @@ watch_over() {  # PROCESS FOLDER
     rm -rf "$2"' watch_over "$1" "$2" </dev/null >/dev/null 2>&1 &)
 }
 
-# Waits for a condition, at most so many seconds.
+# Waits for a condition, at most this many seconds.
 wait_for() {  # SECONDS WHAT COMMAND…
   local end=$((SECONDS + $1)) what=$2
   shift 2

@@ -243,7 +243,7 @@ TEST(Attribution, AUnitIsNamedOnlyWhereTheFactorIsOne) {
   EXPECT_TRUE(Mentions(kilo.Run().attribution, "is the unit kN")) << kilo.Run().attribution.text;
 }
 
-TEST(Attribution, ACommandThatAllMissAlikeIsNobodysAlone) {
+TEST(Attribution, ACommandThatAllMissAlikeNamesNoWitness) {
   Case c;
   for (Trace* trace : {&c.analytic, &c.reference, &c.simulated})
     Perturb(trace, "d2.position", 2e-9);

@@ -79,19 +79,19 @@ TEST(Comparison, TheWorstSampleIsNamed) {
   EXPECT_DOUBLE_EQ(comparison.FindCheck("simulated_vs_analytic.force_max")->time_s, 0.42);
 }
 
-// One bend per metric: channel, offset that is about twice the inverse-mode limit, check that
-// fails.
-struct BendCase {
+// One perturbation per metric: channel, offset that is about twice the inverse-mode limit, check
+// that fails.
+struct PerturbedCase {
   const char* channel;
   double offset;
   const char* check;
 
-  friend std::ostream& operator<<(std::ostream& out, const BendCase& bend) {
-    return out << bend.channel << " + " << bend.offset;
+  friend std::ostream& operator<<(std::ostream& out, const PerturbedCase& perturbation) {
+    return out << perturbation.channel << " + " << perturbation.offset;
   }
 };
 
-class PerturbedSimulation : public testing::TestWithParam<BendCase> {};
+class PerturbedSimulation : public testing::TestWithParam<PerturbedCase> {};
 
 TEST_P(PerturbedSimulation, FailsItsCheckAndTheVerdict) {
   Case c;
@@ -110,17 +110,19 @@ TEST_P(PerturbedSimulation, PassesWithAHundredthOfThePerturbation) {
 INSTANTIATE_TEST_SUITE_P(
     Metrics, PerturbedSimulation,
     testing::Values(
-        BendCase{"d1.force", 2e-10 * 76.2, "simulated_vs_analytic.force_nrmse"},
-        BendCase{"d1.position", 2e-10, "simulated_vs_analytic.position_m"},
-        BendCase{"d1.velocity", 2e-9 * 3.4, "simulated_vs_reference.velocity_nrmse"},
-        BendCase{"d1.acceleration", 2e-8 * 21.0, "simulated_vs_analytic.acceleration_nrmse"},
-        BendCase{"plate.x", 2e-9, "simulated_vs_analytic.pose_m"},
-        BendCase{"plate.yaw", 2e-9, "simulated_vs_analytic.pose_rad"},
-        BendCase{"slide1.reaction.fx", 2e-8 * 10.5 * 1.8, "simulated_vs_analytic.reaction_nrmse"},
-        BendCase{"slide1.reaction.my", 2e-8 * 2.0 * 1.8, "simulated_vs_analytic.reaction_nrmse"},
-        BendCase{"closure.position", 2e-10, "simulated.closure_m"},
-        BendCase{"closure.rotation", 2e-10, "simulated.closure_rad"},
-        BendCase{"power.energy_rate", 2e-8 * 50.0, "simulated.power_balance"}),
+        PerturbedCase{"d1.force", 2e-10 * 76.2, "simulated_vs_analytic.force_nrmse"},
+        PerturbedCase{"d1.position", 2e-10, "simulated_vs_analytic.position_m"},
+        PerturbedCase{"d1.velocity", 2e-9 * 3.4, "simulated_vs_reference.velocity_nrmse"},
+        PerturbedCase{"d1.acceleration", 2e-8 * 21.0, "simulated_vs_analytic.acceleration_nrmse"},
+        PerturbedCase{"plate.x", 2e-9, "simulated_vs_analytic.pose_m"},
+        PerturbedCase{"plate.yaw", 2e-9, "simulated_vs_analytic.pose_rad"},
+        PerturbedCase{"slide1.reaction.fx", 2e-8 * 10.5 * 1.8,
+                      "simulated_vs_analytic.reaction_nrmse"},
+        PerturbedCase{"slide1.reaction.my", 2e-8 * 2.0 * 1.8,
+                      "simulated_vs_analytic.reaction_nrmse"},
+        PerturbedCase{"closure.position", 2e-10, "simulated.closure_m"},
+        PerturbedCase{"closure.rotation", 2e-10, "simulated.closure_rad"},
+        PerturbedCase{"power.energy_rate", 2e-8 * 50.0, "simulated.power_balance"}),
     [](const auto& info) {
       std::string name = info.param.check;
       name = name.substr(name.find('.') + 1) + std::to_string(info.index);
@@ -218,7 +220,7 @@ TEST(Comparison, ForcesThatCancelOutAreJudgedByTheForceScaleOfTheMechanism) {
   const ForceScale scale = ForceScaleOf(c.Input(), c.analytic);
   EXPECT_NEAR(scale.force_N, 0.5 * w * w / std::numbers::sqrt2, 0.1);
   EXPECT_EQ(bent_by(0.0).verdict, Verdict::kAgree);
-  // One of two drives is perturbed: the pooled RMS is 1/√2 of the bend.
+  // One of two drives is perturbed: the pooled RMS is 1/√2 of the perturbation.
   const double just = std::numbers::sqrt2 * limit * scale.Floor("N");
   EXPECT_EQ(bent_by(0.5 * just).verdict, Verdict::kAgree);
   EXPECT_TRUE(Fails(bent_by(2.0 * just), "simulated_vs_analytic.force_nrmse"));

@@ -45,8 +45,8 @@ TEST(Derivatives, WrongAccelerationsAreStillSeenBetweenTheJumps) {
   EXPECT_GT(WorstRate(0.05037, 2 * limit), limit);
 }
 
-// d1 follows a sine with so many samples per period, d2 stands still but for what its acceleration
-// claims.
+// d1 follows a sine with this many samples per period, d2 stands still but for what its
+// acceleration claims.
 struct Fast {
   Mechanism mechanism = synthetic::TwoSliders();
   Motion motion;
@@ -247,9 +247,9 @@ TEST(DriveMotion, ADriveHeldStillIsComparedOnTheScaleOfOtherUnitsToo) {
     synthetic::Stretch(trace, "d1.acceleration", 10.0);
   }
   c.mechanism.gravity_W.setZero();
-  const auto value = [&](double bend) {
+  const auto value = [&](double perturbation) {
     Trace perturbed = c.simulated;
-    synthetic::Perturb(&perturbed, "d2.acceleration", bend);
+    synthetic::Perturb(&perturbed, "d2.acceleration", perturbation);
     const PairComparison pair = ComparePair(c.Input(), perturbed, c.analytic);
     return pair.metrics.at(Metric::kAcceleration).value;
   };

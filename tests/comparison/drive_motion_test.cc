@@ -1,5 +1,5 @@
 // Who follows whom, and what is therefore no evidence.
-#include "comparison/drive_motion.h"
+#include "comparison/driven.h"
 
 #include <gtest/gtest.h>
 

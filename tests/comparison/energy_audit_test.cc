@@ -1,5 +1,5 @@
 // The energy balance of a mass on a damped spring, pushed by a motor, worked out by hand.
-#include "comparison/energy_audit.h"
+#include "comparison/comparison.h"
 
 #include <gtest/gtest.h>
 

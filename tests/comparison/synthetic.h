@@ -94,7 +94,7 @@ inline void Stretch(Trace* trace, const std::string& channel, double factor) {
   trace->values.col(trace->Find(channel)) *= factor;
 }
 
-/// Three witnesses that agree exactly; tests bend one of them and compare.
+/// Three witnesses that agree exactly; tests perturb one of them and compare.
 struct Case {
   Mechanism mechanism = TwoSliders();
   Motion motion = TwoSines();

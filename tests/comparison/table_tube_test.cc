@@ -1,5 +1,5 @@
-// Judging against a table: rounding and noise pass, the smallest bend that they do not explain
-// fails, and a table that is wrong as a whole is reported what it looks like.
+// Judging against a table: rounding and noise pass, the smallest perturbation that they do not
+// explain fails, and a table that is wrong as a whole is reported what it looks like.
 #include "comparison/table_tube.h"
 
 #include <gtest/gtest.h>
@@ -8,8 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "comparison/table_diagnosis.h"
-#include "scenario/tables/grid.h"
+#include "scenario/tables/table.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {

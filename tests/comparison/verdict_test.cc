@@ -25,7 +25,7 @@ TEST(Verdict, TheOneFarFromTwoThatAreCloseIsOdd) {
   EXPECT_EQ(OddOneOut(SortedDistances(1.0, 1.0, 1e-6)), "analytic");
 }
 
-TEST(Verdict, NobodyIsOddUnlessClearlyFarther) {
+TEST(Verdict, NoWitnessIsOddUnlessClearlyFarther) {
   EXPECT_EQ(OddOneOut(SortedDistances(9.9, 1.0, 9.9)), "");
   EXPECT_EQ(OddOneOut(SortedDistances(10.0, 1.0, 10.0)), "simulated");
   EXPECT_EQ(OddOneOut(SortedDistances(1.0, 1.0, 1.0)), "");

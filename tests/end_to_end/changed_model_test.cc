@@ -113,7 +113,8 @@ TEST(AnyFolder, ShippedModelsAndScenariosAreFound) {
   EXPECT_EQ(mbverify.From(mbverify.folder(), "audit spr_tripod").exit_code, 0);
 }
 
-// As after `mbverify init`: names lead to one's own first, then to the shipped ones.
+// As after `mbverify init`: names are looked up in the user's folder first, then among the shipped
+// ones.
 TEST(AnyFolder, OwnScenariosDoNotHideTheShippedOnes) {
   const Program mbverify("own_scenarios");
   const fs::path own = mbverify.folder() / "scenarios" / "four_bar";

@@ -93,12 +93,12 @@ TEST(NightlyExamples, TheGithubWorkflowHangsTogether) {
 
 TEST(NightlyExamples, ABrokenWorkflowIsNoticed) {
   const std::string text = ReadAll(kNightly + "github-nightly.yml");
-  const std::map<std::string, std::string> bends = {
+  const std::map<std::string, std::string> perturbations = {
       {"needs: build\n", "needs: bulid\n"},
       {"actions/checkout@v4", "actions/checkout"},
       {"retention-days: 3\n", "compression: 3\n"},
       {"      - run: tar -czf", "      - name: tar -czf"}};
-  for (const auto& [from, to] : bends) {
+  for (const auto& [from, to] : perturbations) {
     std::string perturbed = text;
     const size_t at = perturbed.find(from);
     ASSERT_NE(at, std::string::npos) << from;

@@ -188,7 +188,7 @@ TEST_F(RobustnessTest, ResultsThatCannotBePrintedAreAnError) {
         << command << "\n"
         << result.err;
   }
-  // Nobody to complain to either.
+  // No stderr to report to either.
   EXPECT_EQ(Shell("\"$mbverify\" " + Run(kSoundScenario) + " >/dev/full 2>/dev/full").exit_code, 3);
 }
 

@@ -1,6 +1,6 @@
 // A user's equations as a closed form: right as the reference, wrong where they are wrong, refused
 // with their own line.
-#include "equations/file_form.h"
+#include "equations/equations.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -239,7 +239,7 @@ TEST(FileForm, FindsAllErrorsOfFormulas) {
       << Make("crank.yaml", text).diagnostics.Text();
 }
 
-// A pose out of reach is the run's to tell: with its time.
+// A pose out of reach is reported by the run, with its time.
 TEST(FileForm, TellsWhereItHasNoPose) {
   const Mechanism mechanism = SliderCrank({{"r", 0.1}, {"l", 0.11}});
   Mechanism longer = mechanism;

@@ -101,7 +101,7 @@ TEST(Formula, NamesRatesAndPartialDerivatives) {
   ASSERT_TRUE(errors.empty());
   const Jet value = formula.At({.names = {{1.3, 0, 0}, {0.5, 3, 7}}, .partial = {{0.25}, {1}}});
   EXPECT_DOUBLE_EQ(value.value, 7 + 90 + 25);
-  // Nobody knows how these move.
+  // It is unknown how these move.
   EXPECT_TRUE(std::isnan(value.rate));
 }
 

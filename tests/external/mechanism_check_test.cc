@@ -63,7 +63,7 @@ struct Perturb {
 
 TEST(MechanismCheck, ReportsWhatIsPerturbed) {
   const std::string written = WrittenModel("four_bar");
-  const Perturb bends[] = {
+  const Perturb perturbations[] = {
       {"no mass", [](Edited* m) { (*m)["bodies"][1].erase("mass"); }, "bodies[1]: "},
       {"a word", [](Edited* m) { (*m)["bodies"][1]["mass"] = "2"; }, "bodies[1].mass: "},
       {"below zero", [](Edited* m) { (*m)["bodies"][1]["mass"] = -2; }, "bodies[1].mass: "},
@@ -101,11 +101,11 @@ TEST(MechanismCheck, ReportsWhatIsPerturbed) {
          for (auto& joint : (*m)["joints"]) joint["closure"] = true;
        },
        "bodies[1]: 'crank' is not joined to the world"}};
-  for (const Perturb& bend : bends) {
+  for (const Perturb& perturb : perturbations) {
     Edited edited = Edited::parse(written);
-    bend.edit(&edited);
+    perturb.edit(&edited);
     const std::string found = Findings(edited.dump());
-    EXPECT_NE(found.find(bend.reported), std::string::npos) << bend.what << "\n" << found;
+    EXPECT_NE(found.find(perturb.reported), std::string::npos) << perturb.what << "\n" << found;
   }
   EXPECT_NE(Findings("{").find("the file ends before its JSON does"), std::string::npos);
   EXPECT_NE(Findings("[]"), "");

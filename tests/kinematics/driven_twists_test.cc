@@ -1,5 +1,5 @@
 // Which bodies move with which drive, by hand.
-#include "kinematics/driven_twists.h"
+#include "kinematics/command_rank.h"
 
 #include <gtest/gtest.h>
 

@@ -81,7 +81,9 @@ class Forces : public EveryMechanism {
   void CheckWitnesses(const Law& law) const {
     for (const Witness witness : kWitnesses) {
       SCOPED_TRACE(NameOf(witness));
-      Check([&](const State& state, double bend) { return law(witness, state, bend); });
+      Check([&](const State& state, double perturbation) {
+        return law(witness, state, perturbation);
+      });
     }
   }
 };
@@ -89,13 +91,14 @@ class Forces : public EveryMechanism {
 TEST_P(Forces, OfAllWitnessesAgree) {
   for (const Witness witness : {Witness::kReference, Witness::kSimulation}) {
     SCOPED_TRACE(NameOf(witness));
-    Check([&](const State& state, double bend) {
+    Check([&](const State& state, double perturbation) {
       // All masses and loads too large: every force is.
-      const Subject heavier = bend > 0 ? subject().With(subject().Heavier(1 + bend)) : subject();
+      const Subject heavier =
+          perturbation > 0 ? subject().With(subject().Heavier(1 + perturbation)) : subject();
       CommandSample loaded = state.command;
       for (LoadSample& load : loaded.loads) {
-        load.force *= 1 + bend;
-        load.moment *= 1 + bend;
+        load.force *= 1 + perturbation;
+        load.moment *= 1 + perturbation;
       }
       const Answer truth = ByClosedForm(subject(), state.command);
       Asked asked(heavier, witness);
@@ -108,14 +111,14 @@ TEST_P(Forces, OfAllWitnessesAgree) {
 }
 
 TEST_P(Forces, AreTheSameWhenTimeRunsBackwards) {
-  CheckWitnesses([&](Witness witness, const State& state, double bend) {
+  CheckWitnesses([&](Witness witness, const State& state, double perturbation) {
     Asked asked(subject(), witness);
     CommandSample back = state.command;
     const VecX ahead = asked.Force(state.command);
     back.velocity *= -1;
     VecX force = asked.Force(back);
     // Perturbed: a dry friction that turns with the velocity.
-    force += bend * ahead.lpNorm<Eigen::Infinity>() * VecX::Ones(force.size());
+    force += perturbation * ahead.lpNorm<Eigen::Infinity>() * VecX::Ones(force.size());
     return Residual{.error = RelativeError(force, ahead),
                     .budget = ForceBudget(subject(), state),
                     .trouble = asked.trouble};
@@ -123,7 +126,7 @@ TEST_P(Forces, AreTheSameWhenTimeRunsBackwards) {
 }
 
 TEST_P(Forces, AreAffineInTheAcceleration) {
-  CheckWitnesses([&](Witness witness, const State& state, double bend) {
+  CheckWitnesses([&](Witness witness, const State& state, double perturbation) {
     Asked asked(subject(), witness);
     // Accelerations large enough to matter beside gravity, different per command.
     CommandSample none = state.command, one = state.command, two = state.command,
@@ -142,7 +145,7 @@ TEST_P(Forces, AreAffineInTheAcceleration) {
         (at_one - at_none).lpNorm<Eigen::Infinity>() + (at_two - at_none).lpNorm<Eigen::Infinity>();
     // Perturbed: the first acceleration too large in the sum.
     both.acceleration +=
-        bend * size / (at_one - at_none).lpNorm<Eigen::Infinity>() * one.acceleration;
+        perturbation * size / (at_one - at_none).lpNorm<Eigen::Infinity>() * one.acceleration;
     const VecX at_both = asked.Force(both);
     Residual r{.error = (at_both - sum).lpNorm<Eigen::Infinity>() / size,
                .budget = ForceBudget(subject(), state),
@@ -157,24 +160,25 @@ TEST_P(Forces, AreAffineInTheAcceleration) {
 
 TEST_P(Forces, OfMotionGravityAndLoadsAddUp) {
   const Subject floating = subject().With({{"g", 0.0}});
-  CheckWitnesses([&](Witness witness, const State& state, double bend) {
+  CheckWitnesses([&](Witness witness, const State& state, double perturbation) {
     Asked asked(subject(), witness), afloat(floating, witness);
     CommandSample load_only = AtRest(state.command);
     const VecX all = asked.Force(state.command);
     const VecX motion = afloat.Force(Unloaded(state.command));
     const VecX gravity = asked.Force(Unloaded(AtRest(state.command)));
     for (LoadSample& load : load_only.loads) {
-      load.force *= 1 + bend;
-      load.moment *= 1 + bend;
+      load.force *= 1 + perturbation;
+      load.moment *= 1 + perturbation;
     }
     const VecX loads = afloat.Force(load_only);
     const double size = motion.lpNorm<Eigen::Infinity>() + gravity.lpNorm<Eigen::Infinity>() +
                         loads.lpNorm<Eigen::Infinity>();
     Residual r{
-        .error = (motion + (1 + bend) * gravity + loads - all).lpNorm<Eigen::Infinity>() / size,
+        .error =
+            (motion + (1 + perturbation) * gravity + loads - all).lpNorm<Eigen::Infinity>() / size,
         .budget = ForceBudget(subject(), state),
         .trouble = asked.trouble + afloat.trouble};
-    if (bend > 0) {  // the share that was perturbed
+    if (perturbation > 0) {  // the share that was perturbed
       r.error *= size / (gravity + loads).lpNorm<Eigen::Infinity>();
     }
     return r;
@@ -184,14 +188,14 @@ TEST_P(Forces, OfMotionGravityAndLoadsAddUp) {
 TEST_P(Forces, ScaleWithAllMassesAndLoads) {
   constexpr double kFactor = 1.75;
   const Subject heavier = subject().With(subject().Heavier(kFactor));
-  CheckWitnesses([&](Witness witness, const State& state, double bend) {
+  CheckWitnesses([&](Witness witness, const State& state, double perturbation) {
     Asked light(subject(), witness), heavy(heavier, witness);
     CommandSample more = state.command;
     for (LoadSample& load : more.loads) {
       load.force *= kFactor;
       load.moment *= kFactor;
     }
-    const VecX expected = kFactor * (1 + bend) * light.Force(state.command);
+    const VecX expected = kFactor * (1 + perturbation) * light.Force(state.command);
     const VecX force = heavy.Force(more);
     return Residual{.error = RelativeError(force, expected),
                     .budget = ForceBudget(subject(), state),
@@ -234,7 +238,7 @@ double PowerOfLoads(const CommandSample& command, const BodyStates& states, doub
 // Drive, base and load power against the energy's rate, the forces of each witness on the bodies'
 // motion of the reference. (The closed form has no base forces; it borrows the reference's.)
 TEST_P(Powers, OfTheForcesAreWhatTheEnergyGains) {
-  CheckWitnesses([&](Witness witness, const State& state, double bend) {
+  CheckWitnesses([&](Witness witness, const State& state, double perturbation) {
     const Answer body = ByReference(subject(), state.command);
     Residual r{.error = 0.0,
                .budget = ForceBudget(subject(), state),
@@ -259,7 +263,7 @@ TEST_P(Powers, OfTheForcesAreWhatTheEnergyGains) {
     // Perturbed: the drive that works most works too much.
     Eigen::Index most = 0;
     drive_power.cwiseAbs().maxCoeff(&most);
-    const double extra = bend * std::copysign(size, drive_power[most]);
+    const double extra = perturbation * std::copysign(size, drive_power[most]);
     r.error = std::abs(drive_power.sum() + base_power.sum() + loads + extra - gained) / size;
     return r;
   });
@@ -267,13 +271,13 @@ TEST_P(Powers, OfTheForcesAreWhatTheEnergyGains) {
 
 TEST_P(Powers, AsReportedBalance) {
   for (const bool simulated : {false, true}) {
-    Check([&](const State& state, double bend) {
+    Check([&](const State& state, double perturbation) {
       Answer answer = ByReference(subject(), state.command);
       const double largest =
           answer.force.lpNorm<Eigen::Infinity>() * answer.driven.velocity.lpNorm<Eigen::Infinity>();
       if (simulated) answer = BySimulation(subject(), answer.driven, state.command);
       const double error =
-          std::abs(answer.power_input_W + bend * largest - answer.energy_rate_W) / largest;
+          std::abs(answer.power_input_W + perturbation * largest - answer.energy_rate_W) / largest;
       return Residual{.error = std::isfinite(error) ? error : 1e300,
                       .budget = ForceBudget(subject(), state),
                       .trouble = TroubleOf("power", answer.summary)};
@@ -283,7 +287,8 @@ TEST_P(Powers, AsReportedBalance) {
 
 // M through everything driven: forces of unit accelerations at rest, without gravity and loads;
 // units taken out by the diagonal.
-Residual MassMatrix(const Subject& floating, const State& state, double bend, bool* definite) {
+Residual MassMatrix(const Subject& floating, const State& state, double perturbation,
+                    bool* definite) {
   Residual r;
   r.budget = ForceBudget(floating, state);
   Answer here = ByClosedForm(floating, state.command);
@@ -303,7 +308,7 @@ Residual MassMatrix(const Subject& floating, const State& state, double bend, bo
   if (!r.trouble.empty()) return r;
   const VecX unit = M.diagonal().cwiseSqrt().cwiseInverse();
   MatX C = unit.asDiagonal() * M * unit.asDiagonal();
-  C(0, n - 1) += bend;
+  C(0, n - 1) += perturbation;
   r.error = (C - C.transpose()).cwiseAbs().maxCoeff();
   *definite = C.allFinite() &&
               Eigen::SelfAdjointEigenSolver<MatX>(0.5 * (C + C.transpose())).eigenvalues()[0] > 0;
@@ -312,9 +317,9 @@ Residual MassMatrix(const Subject& floating, const State& state, double bend, bo
 
 TEST_P(Forces, SeeASymmetricPositiveDefiniteMassMatrix) {
   const Subject floating = subject().With({{"g", 0.0}});
-  Check([&](const State& state, double bend) {
+  Check([&](const State& state, double perturbation) {
     bool definite = false;
-    const Residual r = MassMatrix(floating, state, bend, &definite);
+    const Residual r = MassMatrix(floating, state, perturbation, &definite);
     EXPECT_TRUE(definite) << r;
     return r;
   });
@@ -327,7 +332,7 @@ TEST_P(MassMatrices, OfTheClosedFormAreSymmetric) {
   const Subject floating = subject().With({{"g", 0.0}});
   std::vector<Eigen::Index> free;
   for (const size_t k : floating.FreeCommands()) free.push_back(static_cast<Eigen::Index>(k));
-  Check([&](const State& state, double bend) {
+  Check([&](const State& state, double perturbation) {
     const MatX J = DriveJacobian(floating, state.command);
     CommandSample c = Unloaded(AtRest(state.command));
     const auto n = static_cast<Eigen::Index>(free.size());
@@ -345,7 +350,7 @@ TEST_P(MassMatrices, OfTheClosedFormAreSymmetric) {
     }
     const VecX unit = M.diagonal().cwiseSqrt().cwiseInverse();
     MatX C = unit.asDiagonal() * M * unit.asDiagonal();
-    C(0, n - 1) += bend;
+    C(0, n - 1) += perturbation;
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<MatX>(0.5 * (C + C.transpose())).eigenvalues()[0], 0.0);
     r.error = (C - C.transpose()).cwiseAbs().maxCoeff();
     return r;

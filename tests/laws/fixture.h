@@ -29,8 +29,8 @@ class EveryMechanism : public ::testing::TestWithParam<std::tuple<std::string, R
   }
 
   /// The law holds at every state, and fails there when the truth is perturbed by about twice the
-  /// budget. `law(state, bend)` returns what it measured; bend 0 is the truth and bend b must
-  /// change a compared quantity by about b of its size.
+  /// budget. `law(state, perturbation)` returns what it measured; perturbation 0 is the truth and
+  /// perturbation b must change a compared quantity by about b of its size.
   template <typename Law>
   void Check(const Law& law) const {
     for (const State& state : states()) {

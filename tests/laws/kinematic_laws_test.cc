@@ -19,18 +19,19 @@ VecX ScaledCommands(const Subject& s, VecX commands) {
 }
 
 // Drives from the closed form, given to the generic solver as commands, lead back.
-Residual InverseThenForward(const Subject& s, const State& state, double bend) {
+Residual InverseThenForward(const Subject& s, const State& state, double perturbation) {
   Residual r;
   r.budget = {.rounding = Rounding(state.condition), .closure = Closure(s, state.condition)};
   Answer inverse = ByClosedForm(s, state.command);
   r.trouble = TroubleOf("closed form", inverse.summary);
   if (!r.trouble.empty()) return r;
-  if (bend > 0) {
-    // A displacement of the drives that moves the commands by `bend`.
+  if (perturbation > 0) {
+    // A displacement of the drives that moves the commands by `perturbation`.
     const MatX J = DriveJacobian(s, state.command);
     VecX moved(J.cols());
     for (Eigen::Index k = 0; k < J.cols(); ++k) {
-      moved[k] = s.IsHeld(static_cast<size_t>(k)) ? 0.0 : bend * s.ScaleOf(static_cast<size_t>(k));
+      moved[k] =
+          s.IsHeld(static_cast<size_t>(k)) ? 0.0 : perturbation * s.ScaleOf(static_cast<size_t>(k));
     }
     inverse.driven.position += J * moved;
   }
@@ -58,8 +59,9 @@ Residual InverseThenForward(const Subject& s, const State& state, double bend) {
 }
 
 TEST_P(Kinematics, ForwardUndoesInverse) {
-  Check(
-      [&](const State& state, double bend) { return InverseThenForward(subject(), state, bend); });
+  Check([&](const State& state, double perturbation) {
+    return InverseThenForward(subject(), state, perturbation);
+  });
 }
 
 // Motion of everything driven along q(t) = p + v t + a t²/2 of the commands.
@@ -78,7 +80,7 @@ VecX Slope(const VecX& mm, const VecX& m, const VecX& p, const VecX& pp, double 
 }
 
 // Rates of positions (order 1) or of velocities (order 2) against differences of them.
-Residual RatesAreDerivatives(const Subject& s, const State& state, int order, double bend) {
+Residual RatesAreDerivatives(const Subject& s, const State& state, int order, double perturbation) {
   const double kStep = state.difference_step_s;
   const auto form = s.MakeClosedForm();
   const auto part = [&](const DrivenSample& d) { return order == 1 ? d.position : d.velocity; };
@@ -96,7 +98,7 @@ Residual RatesAreDerivatives(const Subject& s, const State& state, int order, do
   const VecX truth = order == 1 ? here.velocity : here.acceleration;
   // At rest the rate is compared with a slow motion.
   const double scale = std::max(truth.lpNorm<Eigen::Infinity>(), 1e-3 * s.length_m);
-  const VecX rate = truth + bend * scale * VecX::Ones(truth.size());
+  const VecX rate = truth + perturbation * scale * VecX::Ones(truth.size());
   Residual r;
   // The coarse difference is off sixteen times as much as the fine one.
   r.budget.truncation = (coarse - fine).lpNorm<Eigen::Infinity>() / scale;
@@ -107,14 +109,14 @@ Residual RatesAreDerivatives(const Subject& s, const State& state, int order, do
 }
 
 TEST_P(Kinematics, VelocitiesAreDerivativesOfPositions) {
-  Check([&](const State& state, double bend) {
-    return RatesAreDerivatives(subject(), state, 1, bend);
+  Check([&](const State& state, double perturbation) {
+    return RatesAreDerivatives(subject(), state, 1, perturbation);
   });
 }
 
 TEST_P(Kinematics, AccelerationsAreDerivativesOfVelocities) {
-  Check([&](const State& state, double bend) {
-    return RatesAreDerivatives(subject(), state, 2, bend);
+  Check([&](const State& state, double perturbation) {
+    return RatesAreDerivatives(subject(), state, 2, perturbation);
   });
 }
 
@@ -128,7 +130,7 @@ double LargestGap(const Mechanism& m, const BodyStates& states) {
   return gap;
 }
 
-Residual LoopsClose(const Subject& s, const State& state, bool simulated, double bend) {
+Residual LoopsClose(const Subject& s, const State& state, bool simulated, double perturbation) {
   Residual r;
   // Positions up to the extent of the mechanism, composed along chains of up to ten bodies.
   r.budget = {.rounding = 1e3 * kEps, .closure = 1e-13 / s.length_m};
@@ -141,17 +143,21 @@ Residual LoopsClose(const Subject& s, const State& state, bool simulated, double
   if (!r.trouble.empty()) return r;
   // Move the first output's body along all axes; whatever joint holds it opens.
   answer.states.X_WB[s.mechanism.outputs.front().body].translation() +=
-      bend * s.length_m * Vec3(1, 1, 1);
+      perturbation * s.length_m * Vec3(1, 1, 1);
   r.error = LargestGap(s.mechanism, answer.states) / s.length_m;
   return r;
 }
 
 TEST_P(Kinematics, LoopsCloseInTheReference) {
-  Check([&](const State& state, double bend) { return LoopsClose(subject(), state, false, bend); });
+  Check([&](const State& state, double perturbation) {
+    return LoopsClose(subject(), state, false, perturbation);
+  });
 }
 
 TEST_P(Kinematics, LoopsCloseInTheSimulation) {
-  Check([&](const State& state, double bend) { return LoopsClose(subject(), state, true, bend); });
+  Check([&](const State& state, double perturbation) {
+    return LoopsClose(subject(), state, true, perturbation);
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, Kinematics,

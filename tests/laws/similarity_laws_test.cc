@@ -18,7 +18,7 @@
 #include "tests/laws/similar.h"
 #include "tests/support/source_dir.h"
 #include "verify/drive_by.h"
-#include "verify/simulate_scenario.h"
+#include "verify/run_witnesses.h"
 
 namespace mbv::laws {
 namespace {
@@ -41,7 +41,7 @@ const char* const kScenarios[] = {"andrews_squeezer/benchmark",
                                   "stabilizing_platform/sea_state",
                                   "vehicle_linkage/drive",
                                   "geared_press/inverse",
-                                  "rubbing_five_bar/draw_inverse",
+                                  "friction_five_bar/draw_inverse",
                                   "bushed_linkage/turn_inverse",
                                   "slider_crank/buffer",
                                   "stewart_legs/dance_inverse",

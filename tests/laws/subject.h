@@ -89,7 +89,7 @@ struct Answer {
 /// Fresh solvers, or one kept by the caller near the state.
 [[nodiscard]] Answer ByReference(const Subject& subject, const CommandSample& command);
 [[nodiscard]] Answer Ask(ReferenceSolver* solver, const CommandSample& command);
-/// MuJoCo's inverse dynamics for the given motion of everything driven, led there by WayTo.
+/// MuJoCo's inverse dynamics for the given motion of everything driven, moved there by WayTo.
 [[nodiscard]] Answer BySimulation(const Subject& subject, const DrivenSample& driven,
                                   const CommandSample& command);
 

@@ -1,4 +1,4 @@
-#include "math/channel.h"
+#include "math/trace.h"
 
 #include <gtest/gtest.h>
 

@@ -101,7 +101,7 @@ TEST(QuinticSpline, IsAsSmoothAsItSays) {
   }
 }
 
-// The trace of the influence matrix, against bending one datum after the other.
+// The trace of the influence matrix, against perturbing one datum after the other.
 TEST(QuinticSpline, CountsItsParameters) {
   const std::vector<double> times = UnevenTimes(15, 1.0);
   const std::vector<double> knots = FreeKnots(times, false);

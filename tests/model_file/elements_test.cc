@@ -164,7 +164,7 @@ TEST(Elements, AreWrittenAsTheyAreRead) {
   const LoadResult again = LoadModelText(WriteModel(*loaded.mechanism), "again.yaml");
   ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
   ExpectSameElements(*loaded.mechanism, *again.mechanism);
-  const LoadResult five = LoadModel(SourcePath("/models/rubbing_five_bar/model.yaml"));
+  const LoadResult five = LoadModel(SourcePath("/models/friction_five_bar/model.yaml"));
   ASSERT_TRUE(five.mechanism.has_value()) << five.diagnostics.Text();
   const LoadResult five_again = LoadModelText(WriteModel(*five.mechanism), "again.yaml");
   ASSERT_TRUE(five_again.mechanism.has_value()) << five_again.diagnostics.Text();

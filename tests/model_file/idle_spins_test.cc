@@ -62,11 +62,13 @@ TEST(IdleSpins, AreNoneWhereSomethingFeelsTheTurn) {
   EXPECT_EQ(why("mass: 2, com: [0.17, 0, 1e-6], inertia: [0.01, 0.3, 0.3]"),
             "the centre of mass of rod lies 1e-06 m beside the line through its balls");
   EXPECT_EQ(why("mass: 2, com: [0.17, 0, 0], inertia: [0.01, 0.3, 0.3001]"),
-            "the inertia of rod is not symmetric about the line through its balls (by 7.07e-05 "
+            "the inertia of rod is not symmetric about the line through its spherical joints (by "
+            "7.07e-05 "
             "kg m²)");
-  EXPECT_EQ(why("mass: 2, com: [0.17, 0, 0], inertia: {xx: 0.01, yy: 0.3, zz: 0.3, xy: 0.001}"),
-            "the inertia of rod is not symmetric about the line through its balls (by 0.001 "
-            "kg m²)");
+  EXPECT_EQ(
+      why("mass: 2, com: [0.17, 0, 0], inertia: {xx: 0.01, yy: 0.3, zz: 0.3, xy: 0.001}"),
+      "the inertia of rod is not symmetric about the line through its spherical joints (by 0.001 "
+      "kg m²)");
   EXPECT_EQ(why(kRoundRod, "outputs: {rod: rod}\n"), "output 'rod' shows its turn");
   EXPECT_EQ(why(kRoundRod, "springs: {s: {from: world, to: rod.side, stiffness: 10}}\n"),
             "spring 's' ends beside the line through its balls");

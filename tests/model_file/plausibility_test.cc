@@ -1,4 +1,4 @@
-// Models that load but are hardly meant: a doubt each, and none about what is right.
+// Models that load but are hardly meant: a warning each, and none about what is right.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -125,7 +125,7 @@ TEST(Plausibility, LengthsInMillimetresAreReportedOnceForAllBodies) {
       << said;
   EXPECT_NE(said.find("are these millimetres?"), std::string::npos) << said;
   EXPECT_EQ(said.find("kg mm²"), std::string::npos)
-      << "a consequence, not a second doubt: " << said;
+      << "a consequence, not a second warning: " << said;
 }
 
 TEST(Plausibility, WhatIsRareButPossibleRaisesNoDoubt) {

@@ -647,7 +647,7 @@ TEST(SdfElements, EachThatIsLeftOutOrRefusedIsNamed) {
   }
 }
 
-TEST(SdfElements, WhatNobodyKnowsIsACaveat) {
+TEST(SdfElements, UnknownElementsAreACaveat) {
   const Read read = ReadText(ArmText({.arm = "<levity>1</levity>"}));
   EXPECT_THAT(SourcesOf(read), Contains("link/levity"));
   EXPECT_THAT(read.text, HasSubstr("<levity> (1: arm) is left out: it is not known"));

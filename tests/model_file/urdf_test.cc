@@ -415,7 +415,7 @@ TEST(UrdfImport, DampingAndFrictionOfJointsAreForceElements) {
 
 // Damping of tree joints stands in the URDF, all else in the companion.
 TEST(UrdfExport, ForceElementsComeBack) {
-  LoadResult loaded = LoadModel(SourcePath("/models/rubbing_five_bar/model.yaml"));
+  LoadResult loaded = LoadModel(SourcePath("/models/friction_five_bar/model.yaml"));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;
   const std::string urdf = WriteFile("friction.urdf", WriteUrdf(m));

@@ -1,4 +1,4 @@
-#include "plot/check_figures.h"
+#include "plot/figure.h"
 
 #include <gtest/gtest.h>
 

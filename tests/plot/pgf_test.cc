@@ -1,11 +1,11 @@
-#include "plot/pgf.h"
+#include "plot/draw.h"
 
 #include <gmock/gmock.h>
 
 #include <sstream>
 
 #include "base/png.h"
-#include "features/paper/default_figures.h"
+#include "features/paper/figures.h"
 #include "tests/support/golden_figure.h"
 #include "tests/support/read_back.h"
 

@@ -186,7 +186,7 @@ TEST(ReferenceElements, FreeFrictionByLoadWithoutASolutionIsRefused) {
 
 // A spring's preload in an element's place moves the torques by as much as it opens them.
 TEST(ReferenceElements, ABandIsWhatAForceInTheElementsPlaceWouldMove) {
-  const LoadResult loaded = LoadModel(SourcePath("/models/rubbing_five_bar/model.yaml"));
+  const LoadResult loaded = LoadModel(SourcePath("/models/friction_five_bar/model.yaml"));
   ASSERT_TRUE(loaded.mechanism);
   const Mechanism& m = *loaded.mechanism;
   Profile home1{{ConstantTerm{m.joints[0].home[0]}}}, home2{{ConstantTerm{m.joints[1].home[0]}}};

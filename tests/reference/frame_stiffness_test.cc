@@ -191,9 +191,9 @@ TEST(FrameStiffness, OfAHingedParallelogramIsThatOfItsTwoRods) {
   const StiffnessResult result = AtHome(m);
   const double L = 1.5, d = 0.4;
   Mat6 K = Mat6::Zero();
-  const double bend = 12 * kEIy / (L * L * L);
-  K.diagonal() << 2 * kGJ / L + 2 * bend * d * d / 4, 2 * 4 * kEIy / L, 2 * kEA / L * d * d / 4,
-      2 * kEA / L, 0, 2 * bend;
+  const double bending = 12 * kEIy / (L * L * L);
+  K.diagonal() << 2 * kGJ / L + 2 * bending * d * d / 4, 2 * 4 * kEIy / L, 2 * kEA / L * d * d / 4,
+      2 * kEA / L, 0, 2 * bending;
   K(1, 5) = K(5, 1) = 2 * 6 * kEIy / (L * L);
   ExpectNear(result.K, K);
   // Its own motion, across the rods, is free.

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "math/spatial.h"
-#include "reference/pose_predictor.h"
+#include "reference/closure_solver.h"
 #include "reference/reference.h"
 #include "reference/square_system.h"
 #include "scenario/load_scenario.h"
@@ -67,7 +67,7 @@ TEST(Rates, DoNotDependOnTheSamplesBefore) {
   }
 }
 
-// A cone whose axis is led around while it spins: R = Rz(a t) Ry(b) Rx(c t), in axes fixed in
+// A cone whose axis is moved around while it spins: R = Rz(a t) Ry(b) Rx(c t), in axes fixed in
 // space.
 struct Cone {
   double a = 1.3, b = 0.7, c = 2.1;

@@ -538,7 +538,7 @@ Followed Against(const OneFreedom& truth, const ForwardRun& run, double step_s) 
 
 struct Start {
   double q, v, duration_s;
-  int passes, stops;  ///< at least so many dead centres, and stops of everything
+  int passes, stops;  ///< at least this many dead centres, and stops of everything
 };
 
 // The reference follows the equation of motion, and not that with a thousandth more friction.

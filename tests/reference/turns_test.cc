@@ -1,4 +1,5 @@
-// Which turn angles are in that no command counts: of a motor behind a screw, whose nut is led.
+// Which turn angles are in that no command counts: of a motor behind a screw, whose nut is
+// prescribed.
 #include <gtest/gtest.h>
 
 #include <numbers>

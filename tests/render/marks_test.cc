@@ -8,8 +8,8 @@
 #include "math/spatial.h"
 #include "model_file/load_model.h"
 #include "render/annotations.h"
-#include "render/arrangement.h"
 #include "render/camera.h"
+#include "render/stage.h"
 #include "tests/mechanisms/rendered.h"
 #include "tests/support/source_dir.h"
 

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "render/annotations.h"
-#include "render/arrangement.h"
 #include "render/stage.h"
 #include "tests/mechanisms/rendered.h"
 

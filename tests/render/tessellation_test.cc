@@ -1,4 +1,4 @@
-#include "render/tessellation.h"
+#include "render/scene.h"
 
 #include <gtest/gtest.h>
 

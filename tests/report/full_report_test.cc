@@ -38,9 +38,9 @@ TEST(FullReport, TheShortLineReportsCaveats) {
             "are all there is.\n");
 }
 
-struct FullBending {
+struct FullPerturbation {
   const char* what;
-  std::function<void(test::FullPage*)> bend;
+  std::function<void(test::FullPage*)> apply;
   std::set<std::string> unseen = {};  // where it is not reported: it has no place there
 };
 
@@ -60,9 +60,9 @@ EnergyAudit& SimulatedEnergy(test::FullPage* f) {
 }
 
 // The truth, perturbed in one place: page, terminal text and summary differ.
-TEST(FullReport, NothingThatItHoldsGoesUntold) {
+TEST(FullReport, EveryFieldIsReported) {
   using F = test::FullPage;
-  const std::vector<FullBending> bendings = {
+  const std::vector<FullPerturbation> perturbations = {
       {"description", [](F* f) { f->report.description = "other"; }},
       {"simulation", [](F* f) { f->report.simulation = "other"; }, {"json"}},
       {"mode", [](F* f) { f->report.mode = "inverse"; }},
@@ -155,14 +155,17 @@ TEST(FullReport, NothingThatItHoldsGoesUntold) {
       {"time of pictures", [](F* f) { f->report.timing.render_s = 5; }},
       {"time of the other engine", [](F* f) { f->report.timing.stock_s = 5; }}};
   const test::FullPage right;
-  for (const FullBending& bending : bendings) {
+  for (const FullPerturbation& perturbation : perturbations) {
     test::FullPage perturbed;
-    bending.bend(&perturbed);
-    EXPECT_EQ(ToJson(perturbed.report) == ToJson(right.report), bending.unseen.contains("json"))
-        << bending.what;
-    EXPECT_EQ(TextOf(perturbed.report) == TextOf(right.report), bending.unseen.contains("text"))
-        << bending.what;
-    EXPECT_EQ(PageOf(perturbed) == PageOf(right), bending.unseen.contains("page")) << bending.what;
+    perturbation.apply(&perturbed);
+    EXPECT_EQ(ToJson(perturbed.report) == ToJson(right.report),
+              perturbation.unseen.contains("json"))
+        << perturbation.what;
+    EXPECT_EQ(TextOf(perturbed.report) == TextOf(right.report),
+              perturbation.unseen.contains("text"))
+        << perturbation.what;
+    EXPECT_EQ(PageOf(perturbed) == PageOf(right), perturbation.unseen.contains("page"))
+        << perturbation.what;
   }
 }
 

@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
-#include "report/html_assets.h"
 #include "report/page.h"
 #include "report/plot_points.h"
 #include "report/result.h"

@@ -1,5 +1,5 @@
 // What a model's joints and drives determine, in words and for programs.
-#include "report/mobility_text.h"
+#include "report/result_tables.h"
 
 #include "tests/mechanisms/two_sliders.h"
 #include "tests/support/golden_file.h"
@@ -58,10 +58,10 @@ TEST(MobilityText, SpinsBetweenTwoBallsAreTold) {
   report.home.idle_spins = {"leg1", "leg2"};
   report.spins_not_idle = {"rod: output 'o' shows its turn"};
   const std::string text = MobilityText(Sliders(), report);
-  for (const char* line :
-       {"constraints - 2 idle spins\n",
-        "  spin of leg2, idle: no force turns it, and no command needs to\n",
-        "  spin between two balls that is a degree of freedom: rod: output 'o' shows its turn\n"}) {
+  for (const char* line : {"constraints - 2 idle spins\n",
+                           "  spin of leg2, idle: no force turns it, and no command needs to\n",
+                           "  spin between two spherical joints that is a degree of freedom: rod: "
+                           "output 'o' shows its turn\n"}) {
     EXPECT_NE(text.find(line), std::string::npos) << line << text;
   }
 }

@@ -150,7 +150,7 @@ TEST(Report, CsvNumbersReadBackExactly) {
   EXPECT_EQ(std::stod(cell), c.analytic.values(1, c.analytic.Find("d1.force")));
 }
 
-// Where friction rests there is no number; the ends of the band stand beside it.
+// Where friction sticks there is no value; the ends of the band stand beside it.
 TEST(Report, CsvGivesTheEndsOfABandAndNoMiddle) {
   Report report = MakeReport(PerturbedCase());
   Trace& trace = report.witnesses[0].trace;

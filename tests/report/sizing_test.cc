@@ -1,9 +1,9 @@
-// Motors and tables of a motion as people and programs read them.
+// Motors and tables of a motion for terminals, pages and JSON.
 #include "report/sizing.h"
 
 #include <gtest/gtest.h>
 
-#include "report/motion_tables.h"
+#include "report/sections.h"
 
 namespace mbv {
 namespace {

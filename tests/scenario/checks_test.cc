@@ -7,7 +7,7 @@
 
 #include "mechanism/reach.h"
 #include "scenario/load_scenario.h"
-#include "scenario/settings_reader.h"
+#include "scenario/section_readers.h"
 #include "tests/support/source_dir.h"
 
 namespace mbv {

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "model_file/load_model.h"
-#include "scenario/motion_reader.h"
+#include "scenario/section_readers.h"
 #include "tests/scenario/load_scenario_fixture.h"
 
 namespace mbv {

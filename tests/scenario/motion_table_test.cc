@@ -314,9 +314,9 @@ TEST_F(MotionTableTest, AnglesThatOnlyMakeSenseInDegreesAreDoubted) {
     folder_.Write("a.csv", text);
     return Messages("{table: {csv: a.csv, column: angle" + more + "}}");
   };
-  const char* doubt = "a.csv:1:7: warning: angle has no unit";
-  EXPECT_NE(messages(45.0, 1.0).find(doubt), std::string::npos) << messages(45.0, 1.0);
-  EXPECT_NE(messages(360.0, 0.0).find(doubt), std::string::npos);
+  const char* warning = "a.csv:1:7: warning: angle has no unit";
+  EXPECT_NE(messages(45.0, 1.0).find(warning), std::string::npos) << messages(45.0, 1.0);
+  EXPECT_NE(messages(360.0, 0.0).find(warning), std::string::npos);
   EXPECT_NE(messages(37.3, 1.0).find("are they degrees? state unit: deg (or rad)"),
             std::string::npos);
   EXPECT_EQ(messages(45.0, 1.0, ", unit: deg").find("no unit"), std::string::npos);

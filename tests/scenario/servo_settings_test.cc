@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "scenario/load_scenario.h"
-#include "scenario/settings_reader.h"
+#include "scenario/section_readers.h"
 #include "tests/support/source_dir.h"
 
 namespace mbv {

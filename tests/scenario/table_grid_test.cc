@@ -12,7 +12,6 @@
 #include <random>
 #include <string>
 
-#include "scenario/tables/grid.h"
 #include "tests/scenario/load_table.h"
 
 namespace mbv {

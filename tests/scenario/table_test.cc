@@ -7,7 +7,7 @@
 #include <string>
 #include <tuple>
 
-#include "scenario/tables/units.h"
+#include "scenario/tables/text.h"
 #include "tests/scenario/load_table.h"
 
 namespace mbv {

@@ -258,7 +258,7 @@ TEST(CompliantSimulation, WithoutMotorTheParallelogramHasNoStiffnessAlongItsMoti
   EXPECT_LT(std::abs(run.result.K(3, 3)), kMeasured * run.result.K(5, 5));
 }
 
-// A leg between two balls under a mass that is guided along the leg's line.
+// A leg between two balls under a mass that slides along the leg's line.
 Mechanism Leg(double servo, bool elastic_rod) {
   Mechanism m = WorldOnly();
   const int head = Add(&m, "head", PoseAt({0, 0, 0.6}));

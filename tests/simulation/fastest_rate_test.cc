@@ -1,5 +1,5 @@
 // How fast springs, dampers and servos are, against formulas.
-#include "simulation/engine/fastest_rate.h"
+#include "simulation/engine/integrator.h"
 
 #include <gtest/gtest.h>
 

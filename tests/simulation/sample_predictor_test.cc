@@ -1,5 +1,5 @@
 // Predictions along smooth motions against motions integrated in small steps.
-#include "simulation/engine/sample_predictor.h"
+#include "simulation/engine/closure_solver.h"
 
 #include <gtest/gtest.h>
 
@@ -41,7 +41,7 @@ struct SmoothMotion {
     }
   }
   // Of the prediction from the n-th sample.
-  [[nodiscard]] double Error(double h, int samples, double bend = 0.0) {
+  [[nodiscard]] double Error(double h, int samples, double perturbation = 0.0) {
     SamplePredictor predictor(engine);
     mjData* d = data.get();
     std::vector<double> qpos(engine.m->qpos0, engine.m->qpos0 + engine.m->nq);
@@ -51,7 +51,7 @@ struct SmoothMotion {
       const VecX v = Velocity(t), a = Velocity(t, true);
       std::copy(v.begin(), v.end(), d->qvel);
       std::copy(a.begin(), a.end(), d->qacc);
-      d->qacc[0] *= 1.0 + bend;
+      d->qacc[0] *= 1.0 + perturbation;
       predictor.Predict(h, d);
       Integrate(t, h, &qpos);
     }

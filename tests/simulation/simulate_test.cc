@@ -76,7 +76,7 @@ TEST(Inverse, NoticesAMassThatIsWrongByOnePartInABillion) {
   EXPECT_GT(TorqueError(run), 1e-11);
 }
 
-// `turns` turns of the crank at 2π/s, with so many samples each, starting at its home angle and
+// `turns` turns of the crank at 2π/s, with this many samples each, starting at its home angle and
 // `first` turns.
 struct Turns {
   double first = 0.0, turns = 1.0;

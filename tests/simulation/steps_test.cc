@@ -1,4 +1,4 @@
-#include "simulation/engine/steps.h"
+#include "simulation/engine/session.h"
 
 #include <gtest/gtest.h>
 

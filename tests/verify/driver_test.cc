@@ -9,7 +9,7 @@
 #include "reference/reference.h"
 #include "tests/support/source_dir.h"
 #include "verify/prepare.h"
-#include "verify/simulate_scenario.h"
+#include "verify/run_witnesses.h"
 
 namespace mbv {
 namespace {
@@ -75,7 +75,7 @@ TEST(Driver, AWrongAccelerationInTheClosedFormNamesItAndNotTheSimulation) {
   }
 }
 
-TEST(Driver, ARightOneIsNobodysFault) {
+TEST(Driver, ACorrectModelNamesNoWitness) {
   for (const char* mode : {"inverse", "forward"}) {
     const Tripod right(mode, 1.0);
     ASSERT_TRUE(right.prepared);

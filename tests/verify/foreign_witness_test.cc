@@ -433,7 +433,7 @@ TEST(ForeignWitness, SimbodyDeclinesFriction) {
   options.pictures = false;
   options.scenario.set = {Simbody()};
   const RunOutcome outcome =
-      RunScenario(SourcePath("/scenarios/rubbing_five_bar/dwell_inverse.yaml"), options);
+      RunScenario(SourcePath("/scenarios/friction_five_bar/dwell_inverse.yaml"), options);
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kAgree);
   EXPECT_EQ(RecordOf(outcome, "simbody")->summary.message, "not applicable: it has elements");

@@ -33,7 +33,7 @@ std::string Replaced(std::string text, const std::string& what, const std::strin
 class OwnEquations : public testing::Test {
  protected:
   OwnEquations() {
-    // Nobody trusts this folder.
+    // This folder is not trusted.
     setenv("XDG_CONFIG_HOME", folder_.PathOf("config").c_str(), 1);
   }
   ~OwnEquations() override { unsetenv("XDG_CONFIG_HOME"); }
@@ -105,7 +105,7 @@ TEST_F(OwnEquations, RunAfterConsentOnly) {
             std::string::npos)
       << refused.diagnostics.Text();
   EXPECT_FALSE(ran());
-  // What asks nobody goes on without them.
+  // Without consent a run goes on without them.
   Diagnostics diagnostics;
   const auto prepared = Prepare(file, {}, &diagnostics);
   ASSERT_TRUE(prepared) << diagnostics.Text();

@@ -32,7 +32,7 @@ const data = {texts, rows: [
   ['a/two', 0, 2, 1, 1, null, null, [], [], [5, 5], 1, 3, 30, 2],
   ['b/three', 0, 2, 0, 1, 2e-12, 1e-9, [-11.7], [], [], 3, 2, 50, 2]]};
 
-test('Rows are read with their texts, and what is missing is no number', () => {
+test('Rows are read with their texts, and what is missing is not a number', () => {
   const [one, two] = readRows(data);
   assert.deepEqual([one.model, one.kind, one.description, one.word, one.limit], ['b', 'bad', 'At rest', 'fails', 1e-9]);
   assert.deepEqual(one.notes, [['bad', 'fails'], ['li', 'worst at leg1']]);

@@ -3,7 +3,7 @@
 // states.json: {"drives": [names], "states": [{"qpos", "qvel", "targets", "applied"}]} with MuJoCo's
 // coordinates, what the drives' equalities are to be held at, and generalized forces of all loads. rows.json answers, per row and state,
 //   R      the row's softness,
-//   bias   what its reference acceleration takes off besides damping and stiffness: J̇q̇, if at all,
+//   bias   what its reference acceleration subtracts in addition to damping and stiffness: J̇q̇, if at all,
 //   force  of the drives, by mj_forward there.
 import fs from 'node:fs';
 

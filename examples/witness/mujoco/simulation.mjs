@@ -1,4 +1,4 @@
-// A generated model in MuJoCo as it is: equalities guided along the drives' motion, their forces read.
+// A generated model in MuJoCo as it is: equalities prescribed along the drives' motion, their forces read.
 import {compile, indicesOf, Refused} from './engine.mjs';
 import {leastSolution} from './algebra.mjs';
 
@@ -8,19 +8,19 @@ const STEEPEST = 0.9999;   // the stiffest impedance that MuJoCo takes
 const WALK = 40;           // steps from home to the first sample
 
 export class Simulation {
-  /** Compiles MJCF that mbverify wrote; `names`: of what is guided. */
+  /** Compiles MJCF that mbverify wrote; `names`: of what is prescribed. */
   constructor(engine, xml, names) {
     const {mj} = engine;
     const {model, messages} = compile(engine, xml);
     Object.assign(this, {engine, mj, model, messages, data: new mj.MjData(model)});
     this.equalities = indicesOf(engine, model, mj.mjtObj.mjOBJ_EQUALITY, model.neq);
-    this.guided = names.map((name) => this.guide(name));
+    this.prescribed = names.map((name) => this.equalityOf(name));
   }
 
   // The residual of a prescribed row is its coordinate − home − eq_data[0].
-  guide(name) {
+  equalityOf(name) {
     const id = this.equalities[`drive:${name}`] ?? this.equalities[`base:${name}`];
-    if (id === undefined) throw new Refused(`the model has no equality that guides ${name}`);
+    if (id === undefined) throw new Refused(`the model has no equality that prescribes ${name}`);
     const {mj, model} = this, object = model.eq_obj1id[id], prescribed = `base:${name}` in this.equalities;
     const tendon = model.eq_type[id] === mj.mjtEq.mjEQ_TENDON.value;
     const home = tendon ? model.tendon_length0[object] : model.qpos0[model.jnt_qposadr[object]];
@@ -28,7 +28,7 @@ export class Simulation {
   }
 
   setTargets(values) {
-    this.guided.forEach((one, k) => { this.model.eq_data[EQUALITY_DATA * one.id] = values[k] - one.home; });
+    this.prescribed.forEach((one, k) => { this.model.eq_data[EQUALITY_DATA * one.id] = values[k] - one.home; });
   }
 
   /** Softness of all equalities: as MuJoCo has it unasked, or as stiff as it takes for this step. */
@@ -80,12 +80,12 @@ export class Simulation {
   /** From home to the first sample: closed, and with its velocity. */
   start(motion) {
     for (let n = 1; n <= WALK; n++) {
-      const targets = this.guided.map((one, k) => one.home + n / WALK * (motion[k][0] - one.home));
+      const targets = this.prescribed.map((one, k) => one.home + n / WALK * (motion[k][0] - one.home));
       if (!this.close(targets)) throw new Refused('the loops do not close at the first sample');
     }
     const {J} = this.rows();
     const rates = new Array(J.length).fill(0);
-    this.guided.forEach((one, k) => { rates[this.rowOf(one)] = motion[k][1]; });
+    this.prescribed.forEach((one, k) => { rates[this.rowOf(one)] = motion[k][1]; });
     this.data.qvel.set(leastSolution(J, rates));
   }
 
@@ -114,10 +114,10 @@ export class Simulation {
     }
   }
 
-  /** Position, velocity, acceleration and force of what is guided, after mj_forward. */
+  /** Position, velocity, acceleration and force of what is prescribed, after mj_forward. */
   driven() {
     const {model, data} = this, nv = model.nv;
-    return this.guided.map((one) => {
+    return this.prescribed.map((one) => {
       const row = this.rowOf(one), J = data.efc_J.slice(row * nv, (row + 1) * nv);
       const along = (v) => J.reduce((sum, value, i) => sum + value * v[i], 0);
       const position = data.efc_pos[row] + one.home + model.eq_data[EQUALITY_DATA * one.id];

@@ -82,7 +82,7 @@ function run(simulation, outputs, motion, loads, stiff) {
 }
 
 /** Computes in the present folder; throws Refused for what it cannot. Returns what stands in
- * witness.json besides the program's name. */
+ * witness.json in addition to the program's name. */
 export function witness(engine, stiff) {
   if (fs.existsSync('start.csv')) throw new Refused('free motions are not stepped here');
   const mechanism = JSON.parse(fs.readFileSync('mechanism.json', 'utf8'));
@@ -95,7 +95,7 @@ export function witness(engine, stiff) {
   const compute_s = Number(process.hrtime.bigint() - begun) / 1e9;
   const named = (names, words) => names.flatMap((name) => words.map((word) => `${name}.${word}`));
   const columns = [
-    ...simulation.guided.flatMap(
+    ...simulation.prescribed.flatMap(
         (one) => named([one.name], one.prescribed ? ['force'] : ['position', 'velocity', 'acceleration', 'force'])),
     ...named(outputs.map((output) => output.name), ['x', 'y', 'z', 'roll', 'pitch', 'yaw']),
   ];

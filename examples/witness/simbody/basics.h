@@ -51,7 +51,7 @@ struct Sample {
   double position = 0.0, velocity = 0.0, acceleration = 0.0;
 };
 
-// Tells how long it lived.
+// Reports how long it lived.
 class Stopwatch {
  public:
   explicit Stopwatch(double* seconds) : seconds_(*seconds) {}

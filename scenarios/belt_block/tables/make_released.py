@@ -1,4 +1,4 @@
-"""A rubbing block released beside its rest, for released.yaml: the published benchmark SDND100
+"""A block with friction released beside its rest, for released.yaml: the published benchmark SDND100
 (EDF, Code_Aster, validation manual V5.01.100; k = 10 000 N/m, m = 1 kg, g = 10 m/s2, mu = 0.1,
 r_0 = 0.85 mm). With w = sqrt(k/m) and F = mu m g the motion turns round at t_n = n pi/w,
   r(t) = (-1)^n (F/k) + (r(t_n) - (-1)^n F/k) cos w (t - t_n)   in t_n <= t <= t_(n+1),

@@ -11,7 +11,7 @@
 #include "math/spatial.h"
 #include "mechanism/channels.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 namespace {
 
 // The complete inverse problem of the cabin robot: drives from the pose of the end effector.
@@ -90,8 +90,9 @@ RunSummary SolvePositions(const CabinGeometry& geometry, Resolution resolution,
 
   const int row = resolution == Resolution::kRailGiven ? 2 : 1;
   if (std::abs(y4[row]) < kSmallDirection) {
-    return Singular("d5", "the wrist slide is across the direction that resolves the redundancy",
-                    y4[row]);
+    return Singular(
+        "d5", "the wrist's prismatic axis is across the direction that resolves the redundancy",
+        y4[row]);
   }
   outer->d5.p = (p[row] - b[row] - c.resolved.p) / y4[row];
   const Vec3 K = p - b - outer->d5.p * y4;
@@ -359,13 +360,9 @@ class CabinRobot final : public ClosedForm {
 };
 
 }  // namespace
-}  // namespace mbv::cabin
 
-namespace mbv {
-
-std::unique_ptr<ClosedForm> MakeCabinRobot(const Mechanism& mechanism, const Motion& motion,
+std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism, const Motion& motion,
                                            const ClosedFormOptions&, Diagnostics* diagnostics) {
-  using namespace cabin;
   if (SpaceOf(motion) == Space::kNone) {
     std::string commanded;
     for (const Command& command : motion.commands) {
@@ -373,7 +370,6 @@ std::unique_ptr<ClosedForm> MakeCabinRobot(const Mechanism& mechanism, const Mot
     }
     diagnostics->Add(
         {.severity = Severity::kError,
-         .file = {},
          .message = fmt::format("the cabin robot's equations cannot follow the commands {}",
                                 commanded.empty() ? "(none)" : commanded),
          .hint = "command exactly eight: d1, th3, th4, d5, th6 with platform.x, platform.y, "
@@ -384,9 +380,6 @@ std::unique_ptr<ClosedForm> MakeCabinRobot(const Mechanism& mechanism, const Mot
   return std::make_unique<CabinRobot>(mechanism, motion);
 }
 
-}  // namespace mbv
-
-namespace mbv::cabin {
 namespace {
 
 // A quarter turn about x, α2, α3 and α5 of Table 1, and the slide's constant turn (α4, θ5).
@@ -563,7 +556,7 @@ Coverage StiffnessCoverageOf(const Mechanism& mechanism) {
   const ParameterReader read(mechanism, &c);
   for (const char* body : {"carriage", "sliderA", "sliderD", "sliderF", "AB", "AB2", "CD", "CD2",
                            "EF", "EF2", "platform", "column", "arm", "rail", "tool", "slewing"}) {
-    c.bodies.push_back({.name = body, .why = {}});
+    c.bodies.push_back({.name = body});
   }
   StateSliders(&c);
   const double w = read("w");
@@ -580,4 +573,4 @@ Coverage StiffnessCoverageOf(const Mechanism& mechanism) {
   return c;
 }
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

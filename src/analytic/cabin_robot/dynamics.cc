@@ -6,7 +6,7 @@
 #include "math/spatial.h"
 #include "mechanism/channels.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 namespace {
 
 using Row8 = Eigen::Matrix<double, 1, kDrives>;
@@ -280,4 +280,4 @@ void JointReactions::Write(const CabinGeometry& geometry,
   }
 }
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -18,7 +18,7 @@
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 
 inline constexpr int kDrives = 8;
 enum DriveIndex { kRail, kX1, kX2, kX3, kTh3, kTh4, kD5, kTh6 };
@@ -168,4 +168,4 @@ class JointReactions {
   std::vector<Channel> channels_;
 };
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 namespace {
 
 // Below this sine a configuration counts as singular: forces grow as its inverse.
@@ -166,4 +166,4 @@ AngleRates RatesOf(const PlanarGeometry& g, const PlanarState& s) {
           absolute(gamma_2, gamma_3)};
 }
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -18,7 +18,7 @@
 #include "base/run_summary.h"
 #include "base/types.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 
 struct PlanarGeometry {
   double L1 = 0.0, L2 = 0.0, L3 = 0.0, L4 = 0.0;  ///< [m]
@@ -53,4 +53,4 @@ struct AngleRates {
 /// Partial derivatives of (14)–(25) in absolute slider coordinates, at the angles of `state`.
 [[nodiscard]] AngleRates RatesOf(const PlanarGeometry& geometry, const PlanarState& state);
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

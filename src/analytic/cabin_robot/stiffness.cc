@@ -9,7 +9,7 @@
 #include "analytic/stiffness_form.h"
 #include "math/spatial.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -399,8 +399,7 @@ void CheckParameters(const Mechanism& mechanism, Diagnostics* diagnostics) {
   for (const Drive& drive : mechanism.drives) {
     if (std::isinf(drive.stiffness)) continue;
     diagnostics->Add(
-        {.file = {},
-         .message =
+        {.message =
              fmt::format("the servo of {} has the stiffness {:g}", drive.name, drive.stiffness),
          .hint = "the paper locks all drives: leave their compliance 0 for the closed form"});
   }
@@ -449,4 +448,4 @@ PoseCoordinates ExampleStiffnessPose() {
 
 std::vector<std::string> UsualStiffnessMaps() { return {"x=-0.1:0.1:81,y=0.25:0.45:81"}; }
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

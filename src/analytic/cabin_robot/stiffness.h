@@ -41,7 +41,7 @@
 #include "analytic/cabin_robot/dynamics.h"
 #include "analytic/stiffness_form.h"
 
-namespace mbv::cabin {
+namespace mbv::cabin_robot {
 
 /// A rectangular section: b along beam z, h along beam y [m].
 struct RectSection {
@@ -155,4 +155,4 @@ RunSummary SolveStiffness(const StiffnessParameters& parameters, const Stiffness
 /// One map over the plane.
 [[nodiscard]] std::vector<std::string> UsualStiffnessMaps();
 
-}  // namespace mbv::cabin
+}  // namespace mbv::cabin_robot

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "analytic/scara_robot/dynamics.h"
@@ -10,7 +9,7 @@
 #include "math/spatial.h"
 #include "mechanism/channels.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 constexpr std::array<int, 4> kTaskComponents = {0, 1, 2, 5};  // x, y, z, yaw of an output
@@ -383,7 +382,7 @@ void StateElasticParallelogram(const ParameterReader& read, int limb, Coverage* 
                     rod_a = Named(limb, ".rod_a"), rod_b = Named(limb, ".rod_b"),
                     hub_D = Named(limb, ".hub_D"), bar = Named(limb, ".bar");
   for (const std::string& body : {arm, hub_C, rod_a, rod_b, hub_D, bar}) {
-    c->bodies.push_back({.name = body, .why = {}});
+    c->bodies.push_back({.name = body});
   }
   const Vec3 zero = Vec3::Zero(), half = read("d") / 2 * kY, tip = read("l2") * kX;
   const auto hinge = [&](const char* name, const std::string& parent, const std::string& child,
@@ -436,7 +435,7 @@ Coverage StiffnessCoverageOf(const Mechanism& mechanism) {
   c.form = "the closed form of the SCARA robot's stiffness";
   const ParameterReader read(mechanism, &c);
   (void)read("branch");
-  c.bodies.push_back({.name = "platform", .why = {}});
+  c.bodies.push_back({.name = "platform"});
   for (int limb = 0; limb < kLimbs; ++limb) {
     AddMotor(read, limb, read("K_act"), &c);
     AddCoveredBeam(read, Named(limb, ".arm"), read("l1"), &c);
@@ -444,8 +443,8 @@ Coverage StiffnessCoverageOf(const Mechanism& mechanism) {
       StateElasticParallelogram(read, limb, &c);
       continue;
     }
-    c.bodies.push_back({.name = Named(limb, ".arm"), .why = {}});
-    c.bodies.push_back({.name = Named(limb, ".rod"), .why = {}});
+    c.bodies.push_back({.name = Named(limb, ".arm")});
+    c.bodies.push_back({.name = Named(limb, ".rod")});
     AddCoveredBeam(read, Named(limb, ".rod"), read("l3"), &c);
     StateRodJoints(read, limb, &c);
   }
@@ -453,4 +452,4 @@ Coverage StiffnessCoverageOf(const Mechanism& mechanism) {
   return c;
 }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

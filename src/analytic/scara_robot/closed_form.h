@@ -4,7 +4,7 @@
 #include "analytic/closed_form.h"
 #include "analytic/coverage.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 /// Driven in joint space (commands on all four drives; the forward position starts from the pose
 /// home_x, home_y, home_z, home_phi) or in task space (platform.x, .y, .z, .yaw). Loads act on the
@@ -30,4 +30,4 @@ namespace mbv::scara {
 /// R-Pa-R, the servos springs.
 [[nodiscard]] Coverage StiffnessCoverageOf(const Mechanism& mechanism);
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

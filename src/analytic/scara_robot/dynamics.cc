@@ -3,7 +3,7 @@
 #include "math/spatial.h"
 #include "mechanism/channels.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 BarInertia SolidBar(double mass, double radius, double length) {
   const double r2 = radius * radius;
   return {mass * (3.0 * r2 + length * length) / 12.0, mass * r2 / 2.0};
@@ -246,4 +246,4 @@ void ReactionChannelsOfLimbs::Write(const Parameters& parameters, const Position
   }
 }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -25,7 +25,7 @@
 #include "analytic/scara_robot/velocity.h"
 #include "math/trace.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 /// Which rod rotation enters the dynamics.
 enum class RodModel {
@@ -126,4 +126,4 @@ class ReactionChannelsOfLimbs {
   std::vector<Channel> channels_;
 };
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -7,7 +7,7 @@
 
 #include "analytic/scara_robot/velocity.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 // Shifts in arm lengths l1.
@@ -264,4 +264,4 @@ DofCount CountDofs() {
   return count;
 }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -32,7 +32,7 @@
 #include "base/types.h"
 #include "mechanism/mechanism.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 using Vec4 = Eigen::Vector4d;
 using Mat4 = Eigen::Matrix4d;
@@ -135,4 +135,4 @@ struct DofCount {
 /// Position-and-orientation-characteristic sets of the limbs, intersected and united.
 [[nodiscard]] DofCount CountDofs();
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

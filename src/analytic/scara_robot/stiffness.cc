@@ -9,31 +9,20 @@
 #include "analytic/scara_robot/workspace.h"
 #include "analytic/stiffness_form.h"
 
-namespace mbv::scara {
+#include "math/spatial.h"
+
+namespace mbv::scara_robot {
 namespace {
 
 /// Columns of J_p (unit axes, lengths over R) below this share of the largest are dependent; the
 /// printed J_p is, exactly, at some poses.
 constexpr double kPassiveRank = 1e-9;
 
-/// Twist of P for a unit rotation about an axis through Q. [Zhu 2019, Eq. 11]
-Vec6 Rotation(const Vec3& axis, const Vec3& p_PQ) {
-  Vec6 screw;
-  screw << axis, p_PQ.cross(axis);
-  return screw;
-}
-
-Vec6 Translation(const Vec3& axis) {
-  Vec6 screw;
-  screw << Vec3::Zero(), axis;
-  return screw;
-}
-
 /// The six columns of a member's tip Q: rotations about and displacements along x, y, z.
 Columns TipColumns(const Vec3& x, const Vec3& y, const Vec3& z, const Vec3& p_PQ) {
   Columns J(6, 6);
-  J << Rotation(x, p_PQ), Rotation(y, p_PQ), Rotation(z, p_PQ), Translation(x), Translation(y),
-      Translation(z);
+  J << RotationScrew(x, p_PQ), RotationScrew(y, p_PQ), RotationScrew(z, p_PQ), TranslationScrew(x),
+      TranslationScrew(y), TranslationScrew(z);
   return J;
 }
 
@@ -41,7 +30,7 @@ void AddServo(const StiffnessParameters& parameters, const Vec3& axis, const Vec
               LimbSprings* limb) {
   MemberSpring& servo = limb->springs[limb->count++];
   servo.member = Member::kServo;
-  servo.J = Rotation(axis, p_PA);
+  servo.J = RotationScrew(axis, p_PA);
   servo.flexibility = Square::Constant(1, 1, 1.0 / parameters.K_act);
 }
 
@@ -83,9 +72,9 @@ LimbSprings ParallelogramLimb(const StiffnessParameters& parameters, const Print
 
   const Vec3& axis = printed.passive_axes ? w : a;
   limb.J_p.resize(6, printed.passive_columns ? 2 : 4);
-  limb.J_p.leftCols<2>() << Rotation(axis, p_PC), Rotation(axis, p_PD);
+  limb.J_p.leftCols<2>() << RotationScrew(axis, p_PC), RotationScrew(axis, p_PD);
   if (!printed.passive_columns) {
-    limb.J_p.rightCols<2>() << Translation(q), Rotation(Vec3::UnitZ(), p_PB);
+    limb.J_p.rightCols<2>() << TranslationScrew(q), RotationScrew(Vec3::UnitZ(), p_PB);
   }
   return limb;
 }
@@ -109,9 +98,9 @@ LimbSprings BallLimb(const StiffnessParameters& parameters, const PrintedForms& 
 
   // The ball at C turns about two axes (its spin about the rod is the one at B).
   limb.J_p.resize(6, 5);
-  limb.J_p << Rotation(printed.rss_passive ? a : y, p_PC),
-      Rotation(printed.rss_passive ? g_u : w.cross(y), p_PC), Rotation(w, p_PB),
-      Rotation(y_rod, p_PB), Rotation(h, p_PB);
+  limb.J_p << RotationScrew(printed.rss_passive ? a : y, p_PC),
+      RotationScrew(printed.rss_passive ? g_u : w.cross(y), p_PC), RotationScrew(w, p_PB),
+      RotationScrew(y_rod, p_PB), RotationScrew(h, p_PB);
   return limb;
 }
 
@@ -393,7 +382,6 @@ class ScaraStiffness final : public StiffnessForm {
 
 void CheckAll(const Mechanism& mechanism, const PoseCoordinates& pose, Diagnostics* diagnostics) {
   const PoseNames names{.needed = {kPoseNames.begin(), kPoseNames.end()},
-                        .accepted = {},
                         .hint = "the pose is platform.x, platform.y, platform.z and platform.yaw"};
   CheckPoseNames(mechanism, names, pose, diagnostics);
   const std::vector<std::string> positive = {"l1",   "l2", "l3", "e", "d", "E", "section_diameter",
@@ -454,4 +442,4 @@ std::vector<std::string> UsualStiffnessMaps() {
           disc + "z=-0.23,yaw_deg=-45"};
 }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

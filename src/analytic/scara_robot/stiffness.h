@@ -36,7 +36,7 @@
 #include "analytic/scara_robot/position.h"
 #include "analytic/stiffness_form.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 using Mat5 = Eigen::Matrix<double, 5, 5>;
 /// Up to six columns, stored in place.
@@ -149,4 +149,4 @@ struct StiffnessIndices {
 /// Maps of Figs 9–11.
 [[nodiscard]] std::vector<std::string> UsualStiffnessMaps();
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 namespace {
 
 Mat34 PlatformPoint(const Vec3& k) {
@@ -94,4 +94,4 @@ RunSummary CheckRegular(const Position& position, const Singularity& singularity
   return summary;
 }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

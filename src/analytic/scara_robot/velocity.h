@@ -14,7 +14,7 @@
 
 #include "analytic/scara_robot/position.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 /// Velocities and accelerations of the platform (X) and the drives (θ).
 struct Rates {
@@ -51,4 +51,4 @@ struct Singularity {
 /// kSingular, with pose and limb, when the pose is rank deficient (see kRankDeficient).
 RunSummary CheckRegular(const Position& position, const Singularity& singularity);
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -12,7 +12,7 @@
 #include "base/demand.h"
 #include "base/worker_pool.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 Limits LimitsOf(const Mechanism& mechanism) {
   Limits limits;
@@ -217,7 +217,6 @@ void AddSlice(const Parameters& parameters, const Limits& limits, double z,
                .y_max = kHalfWidth,
                .columns = kCells,
                .rows = kCells,
-               .values = {},
                .log_scale = true};
   std::string csv = "x_m,y_m,z_m,yaw_rad,reachable,limb,excess,s_min,det\n";
   for (const PoseCheck& pose : slice) {
@@ -305,4 +304,4 @@ WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRe
   return outcome;
 }
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -9,7 +9,7 @@
 #include "analytic/scara_robot/velocity.h"
 #include "analytic/workspace_form.h"
 
-namespace mbv::scara {
+namespace mbv::scara_robot {
 
 /// Ranges that bound the workspace [rad]; the default has none.
 struct Limits {
@@ -90,4 +90,4 @@ struct CylinderCheck {
 [[nodiscard]] WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
                                                  const WorkspaceRequest& request);
 
-}  // namespace mbv::scara
+}  // namespace mbv::scara_robot

@@ -91,9 +91,7 @@ void WireCommands(const Motion& motion, Wiring* wiring, Diagnostics* diagnostics
   wiring->task_space = complete(0);
   if (motion.commands.size() != 3 || (!complete(0) && !complete(3))) {
     diagnostics->AddError(
-        "",
-        "the commands do not fix the three degrees of freedom in a way the closed form "
-        "covers",
+        "", "the commands do not fix the three degrees of freedom in a way the closed form covers",
         hint);
     return;
   }
@@ -224,14 +222,10 @@ class SprTripod final : public ClosedForm {
 };
 
 }  // namespace
-}  // namespace mbv::spr_tripod
 
-namespace mbv {
-
-std::unique_ptr<ClosedForm> MakeSprTripod(const Mechanism& mechanism, const Motion& motion,
-                                          const ClosedFormOptions& /*options*/,
-                                          Diagnostics* diagnostics) {
-  using namespace spr_tripod;
+std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism, const Motion& motion,
+                                           const ClosedFormOptions& /*options*/,
+                                           Diagnostics* diagnostics) {
   Diagnostics found;
   Geometry geometry = ReadGeometry(mechanism, &found);
   const Masses masses = ReadMasses(mechanism, &found);
@@ -246,9 +240,6 @@ std::unique_ptr<ClosedForm> MakeSprTripod(const Mechanism& mechanism, const Moti
   return std::make_unique<SprTripod>(mechanism, std::move(geometry), masses, std::move(wiring));
 }
 
-}  // namespace mbv
-
-namespace mbv::spr_tripod {
 namespace {
 
 AssumedBody BodyOf(const ParameterReader& read, const std::string& name, const std::string& stem) {
@@ -281,8 +272,7 @@ void StateAzimuths(const ParameterReader& read, int leg, Coverage* c) {
                         .quantity = "cos(theta - phi)",
                         .actual = std::cos(theta - kPaper[leg]),
                         .assumed = 0.0,
-                        .unit = {},
-                        .why = "hinges are perpendicular to O_A A_i"});
+                        .why = "revolute axes are perpendicular to O_A A_i"});
 }
 
 void StateLeg(const ParameterReader& read, int leg, Coverage* c) {

@@ -17,21 +17,17 @@
 #include "analytic/closed_form.h"
 #include "analytic/coverage.h"
 
-namespace mbv {
+namespace mbv::spr_tripod {
 
 /// Factory for the registry. The mechanism must have joints legN.S (world – cylinder), legN.P
 /// (cylinder – rod), legN.R (rod – platform), drives on legN.P in order of N, and the parameters
 /// that spr_tripod::ReadGeometry and ReadMasses name.
-[[nodiscard]] std::unique_ptr<ClosedForm> MakeSprTripod(const Mechanism& mechanism,
-                                                        const Motion& motion,
-                                                        const ClosedFormOptions& options,
-                                                        Diagnostics* diagnostics);
-
-}  // namespace mbv
+[[nodiscard]] std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism,
+                                                         const Motion& motion,
+                                                         const ClosedFormOptions& options,
+                                                         Diagnostics* diagnostics);
 
 // What the equations of the 3-SPR mechanism take for granted.
-
-namespace mbv::spr_tripod {
 
 /// Three equal legs at 120, −120 and 0 degrees with tangential hinges; any inertias.
 [[nodiscard]] Coverage CoverageOf(const Mechanism& mechanism);

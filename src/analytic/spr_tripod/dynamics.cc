@@ -17,8 +17,7 @@ RunSummary Singular(const Posture& p, const char* what, double det) {
           .message = fmt::format("at O_A = ({:.6g}, {:.6g}, {:.6g}) m {} (determinant {:.1e})",
                                  p.r.x(), p.r.y(), p.r.z(), what, det),
           .where = "platform",
-          .amount = det,
-          .unit = {}};
+          .amount = det};
 }
 
 // Force and moment (about the body's origin) that a body's motion asks for, loads deducted.

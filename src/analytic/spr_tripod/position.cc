@@ -78,7 +78,7 @@ Geometry ReadGeometry(const Mechanism& mechanism, Diagnostics* diagnostics) {
     if (!(std::abs(std::cos(theta - kPhi[i])) < kAngleTolerance)) {
       diagnostics->AddError(
           "", fmt::format("theta_{} = {} rad is not tangential (phi ± pi/2)", i + 1, theta),
-          "the closed form holds for hinges perpendicular to O_A A_i; use analytic: none");
+          "the closed form holds for revolute axes perpendicular to O_A A_i; use analytic: none");
     }
     g.c[i] = Direction(theta);
   }
@@ -286,8 +286,7 @@ RunSummary SolveForward(const Geometry& geometry, const PerLeg<double>& q, Postu
   return {.stop = Stop::kUnreachable,
           .message = fmt::format("leg lengths ({:.6g}, {:.6g}, {:.6g}) m have no upright assembly",
                                  q[0], q[1], q[2]),
-          .where = "platform",
-          .unit = {}};
+          .where = "platform"};
 }
 
 std::vector<Assembly> AllAssemblies(const Geometry& geometry, const Vec3& r) {

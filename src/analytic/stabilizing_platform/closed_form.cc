@@ -182,7 +182,7 @@ const Mat3 kParallel = Mat3::Identity();
 void StateShip(const ParameterReader& read, Coverage* c) {
   const Vec3 zero = Vec3::Zero();
   for (const char* body : {"ship_heave", "ship_roll", "ship", "lower_platform"}) {
-    c->bodies.push_back({.name = body, .why = {}});
+    c->bodies.push_back({.name = body});
   }
   const auto add = [&](const char* name, JointKind kind, const char* parent, const char* child,
                        const Vec3& axis) {
@@ -266,7 +266,6 @@ void StateLimb(const ParameterReader& read, int index, double azimuth, Coverage*
         r_a * e_r - s * read("L5") * e_t, zero, e_t, X);
     add(j == 0 ? "R12" : "R12_p", kRevolute, link1, link2, elbow, zero, X, X);
     c->drives.push_back({.name = limb + "drive" + suffix,
-                         .joint = {},
                          .body_from = "lower_platform",
                          .body_to = link1,
                          .p_from = r_a * e_r + s * read("L4") * e_t,
@@ -327,8 +326,7 @@ constexpr std::array kPose = {"x", "y", "z", "roll", "pitch", "yaw"};
 
 constexpr const char* kHint =
     "command roll, pitch and heave, and either platform.z, platform.roll, platform.pitch with "
-    "three "
-    "equal pairs of drives, or all of platform.x, y, z, roll, pitch, yaw";
+    "three equal pairs of drives, or all of platform.x, y, z, roll, pitch, yaw";
 
 // Fills the entry of `map` that a command belongs to; false when there is none.
 bool Place(const Mechanism& mechanism, const Command& command, int index, CommandMap* map) {

@@ -150,7 +150,6 @@ RunSummary SolveLimb(const PlatformParameters& p, const LimbMotion& limb, const 
     return {
         .stop = Stop::kSingular,
         .message = fmt::format("links 2 and 2' are in one line: sine {:.3g}", det / (p.L3 * p.L3)),
-        .where = {},
         .amount = det / (p.L3 * p.L3),
         .unit = "1"};
   }

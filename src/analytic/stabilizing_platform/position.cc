@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "math/spatial.h"
+
 namespace mbv::stabilizing_platform {
 namespace {
 
@@ -12,7 +14,7 @@ namespace {
 constexpr double kSmallSine = 1e-8;
 
 RunSummary Trouble(Stop stop, std::string message, double amount, const char* unit) {
-  return {.stop = stop, .message = std::move(message), .where = {}, .amount = amount, .unit = unit};
+  return {.stop = stop, .message = std::move(message), .amount = amount, .unit = unit};
 }
 
 // Links 1 and 2 must form a triangle with the line foot – tip.
@@ -191,49 +193,33 @@ double Amplification::operator()(const LimbMotion& limb) const {
   return (limb.length.value - l_0_) / dR;
 }
 
-namespace {
-
-Vec6 Rotation(const Vec3& s, const Vec3& r) {
-  Vec6 screw;
-  screw << s, r.cross(s);
-  return screw;
-}
-
-Vec6 Translation(const Vec3& s) {
-  Vec6 screw;
-  screw << Vec3::Zero(), s;
-  return screw;
-}
-
-}  // namespace
-
 std::array<Vec6, 9> LimbScrews(double b1, double b2, double c2, double c3) {
   const Vec3 X = Vec3::UnitX(), Y = Vec3::UnitY(), Z = Vec3::UnitZ();
   const Vec3 A = Vec3::Zero(), B(0, 0, c3);
-  return {Rotation(X, {0, -b1, 0}),
-          Rotation(Y, A),
-          Rotation(X, {0, b2, c2}),
-          Rotation(X, B),
-          Rotation(Y, B),
-          Rotation(Z, B),
-          Rotation(X, {0, -b2, c2}),
-          Rotation(X, {0, b1, 0}),
-          Rotation(Y, A)};
+  return {RotationScrew(X, {0, -b1, 0}),
+          RotationScrew(Y, A),
+          RotationScrew(X, {0, b2, c2}),
+          RotationScrew(X, B),
+          RotationScrew(Y, B),
+          RotationScrew(Z, B),
+          RotationScrew(X, {0, -b2, c2}),
+          RotationScrew(X, {0, b1, 0}),
+          RotationScrew(Y, A)};
 }
 
 std::array<Vec6, 5> EquivalentScrews(double c3) {
   const Vec3 X = Vec3::UnitX(), Y = Vec3::UnitY(), Z = Vec3::UnitZ();
   const Vec3 B(0, 0, c3);
-  return {Rotation(Y, Vec3::Zero()), Translation(c3 * Z), Rotation(X, B), Rotation(Y, B),
-          Rotation(Z, B)};
+  return {RotationScrew(Y, Vec3::Zero()), TranslationScrew(c3 * Z), RotationScrew(X, B),
+          RotationScrew(Y, B), RotationScrew(Z, B)};
 }
 
 Mat6 VirtualLimbScrews(const LimbPlace& place, const LimbMotion& limb) {
   Mat6 J;
-  J.col(0) = Rotation(place.e_r, limb.p_oA);
-  J.col(1) = Rotation(place.e_t, limb.p_oA);
-  J.col(2) = Translation((limb.p_oB - limb.p_oA) / limb.length.value);
-  for (int k = 0; k < 3; ++k) J.col(3 + k) = Rotation(Vec3::Unit(k), limb.p_oB);
+  J.col(0) = RotationScrew(place.e_r, limb.p_oA);
+  J.col(1) = RotationScrew(place.e_t, limb.p_oA);
+  J.col(2) = TranslationScrew((limb.p_oB - limb.p_oA) / limb.length.value);
+  for (int k = 0; k < 3; ++k) J.col(3 + k) = RotationScrew(Vec3::Unit(k), limb.p_oB);
   return J;
 }
 

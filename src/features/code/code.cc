@@ -8,14 +8,11 @@
 #include <random>
 
 #include "base/files.h"
-#include "base/scratch_folder.h"
+#include "base/json_text.h"
 #include "base/sha256.h"
 #include "base/text.h"
 #include "base/worker_pool.h"
-#include "features/code/code_check.h"
-#include "features/code/start_table.h"
 #include "kinematics/command_rank.h"
-#include "mechanism/reach.h"
 
 namespace mbv {
 namespace {
@@ -305,10 +302,6 @@ class CodeMaker {
   std::vector<TestState> states_, open_;
 };
 
-nlohmann::ordered_json NumberOrNull(double value) {
-  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
-
 std::string JudgementText(const CodeJudgement& judgement) {
   if (!judgement.not_judged.empty()) {
     std::string text =
@@ -417,13 +410,13 @@ nlohmann::ordered_json ToJson(const CodeResult& result, const std::string& model
                                   {"agrees", one.agrees()},
                                   {"states", one.states},
                                   {"only_one", one.only_one},
-                                  {"position", NumberOrNull(one.position)},
-                                  {"rates", NumberOrNull(one.jacobian)},
-                                  {"force", NumberOrNull(one.force)},
-                                  {"along", NumberOrNull(one.along)},
-                                  {"output", NumberOrNull(one.output)},
-                                  {"back", NumberOrNull(one.back)},
-                                  {"nanoseconds", NumberOrNull(one.nanoseconds)},
+                                  {"position", Number(one.position)},
+                                  {"rates", Number(one.jacobian)},
+                                  {"force", Number(one.force)},
+                                  {"along", Number(one.along)},
+                                  {"output", Number(one.output)},
+                                  {"back", Number(one.back)},
+                                  {"nanoseconds", Number(one.nanoseconds)},
                                   {"slip", one.slip},
                                   {"warnings", one.warnings}});
   }

@@ -2,6 +2,7 @@
 // Python, judged against the reference.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "base/diagnostics.h"
 #include "features/code/code_text.h"
 #include "mechanism/mechanism.h"
+#include "reference/reduced_model.h"
 
 namespace mbv {
 
@@ -93,5 +95,90 @@ struct CodeTask {
 [[nodiscard]] CodeResult MakeCode(const Mechanism& mechanism, const CodeTask& task,
                                   const CodeSettings& settings,
                                   const std::function<void(double)>& progress = {});
+
+// A table that Newton's method starts from, with a proof of where a fixed number of steps does.
+//
+// For every cell of a box of q, with y what a block searches, c and G = ∂y/∂q at the cell's centre,
+// and all functions by interval arithmetic (Boost.Interval):
+//   y = c + G (q − q_c) + e,  K(E) = −A r(c + G (q − q_c)) + (1 − A J(Y)) E ⊂ E
+//                                               one solution y*(q), e in E, for each q         (1)
+//   e_0 <= |y_0(q_c) − c| + |E| + Σ_i |∂_i y_0 − G_i| h_i / 2                                  (2)
+//   e_k+1 <= ½ β Λ (e_k + D ε)² + D ε                                                          (3)
+// [Krawczyk 1969; Moore, Kearfott, Cloud 2009, ch. 8; Ortega 1968]. A: about J⁻¹; y_0: the table
+// between its nodes, multilinear; β: bound of |J⁻¹|, Λ: of the second derivatives, on Y widened by
+// e_0; ε: the error that the blocks before are left with, which end their steps first; D: bound of
+// |J⁻¹ ∂r/∂y_before|. Cells are connected with the one at home by common solutions on their faces,
+// so that the branch is that of home.
+
+/// Over the box; cells that are not proved are outside. At most three coordinates. An empty table
+/// (no cells) with `why` where a proof is beyond it: balls that are searched, large blocks.
+[[nodiscard]] StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low,
+                                        const VecX& high, std::string* why,
+                                        const std::function<void(double)>& progress);
+
+/// Over the cells that `start` proves.
+[[nodiscard]] LookupTable MakeLookupTable(const MechanismFormulas& formulas,
+                                          const StartTable& start);
+
+// Generated code against the reference: compiled, run at states, and compared. Internal to
+// features/code/.
+
+/// The reference at states of a task.
+class CodeReference {
+ public:
+  CodeReference(const Mechanism& mechanism, const CodeTask& task);
+
+  /// Fills actuators and forces of a state with q, v and a, from home. False with `why` where it is
+  /// not reached, or the actuators do not hold it.
+  [[nodiscard]] bool Find(TestState* state, std::string* why);
+
+ private:
+  const Mechanism& mechanism_;
+  const CodeTask& task_;
+  ReducedModel model_;                       ///< of the whole
+  std::optional<ReducedModel> own_, given_;  ///< of the parts
+  VecX held_;
+};
+
+/// A loop counts as closed where its residual is below: what home leaves open, at least rounding.
+[[nodiscard]] double CodeClosureTolerance(const MechanismFormulas& formulas);
+
+/// A program for a header: without arguments it runs the self-test; with a file of states and one
+/// to write, it computes there.
+[[nodiscard]] std::string CheckProgram(const MechanismFormulas& formulas,
+                                       const CodeTextOptions& options);
+
+class CodeCheck {
+ public:
+  /// `states`: with what the reference found there. `open`: where it found nothing.
+  CodeCheck(const MechanismFormulas& formulas, const CodeTextOptions& options,
+            const std::vector<TestState>& states, const std::vector<TestState>& open);
+
+  [[nodiscard]] CodeJudgement C(const std::string& header, bool from_table);
+  /// At the first states.
+  [[nodiscard]] CodeJudgement Python(const std::string& module, size_t most);
+  /// What makes the difference of the last code that was judged, in words; "": not found out.
+  [[nodiscard]] std::string Slip(CodeReference* reference) const;
+
+ private:
+  struct Found {
+    bool reached = false;
+    VecX actuators, rates, accelerations, forces, along, outputs;
+    double back = kNan;
+  };
+  [[nodiscard]] std::string Run(const std::vector<std::string>& argv,
+                                const std::filesystem::path& folder, size_t count,
+                                CodeJudgement* judgement);
+  /// `may_refuse`: the code need not reach all states.
+  void Compare(CodeJudgement* judgement, bool may_refuse) const;
+  [[nodiscard]] bool ClosesOtherwise(const VecX& q, const VecX& actuators) const;
+
+  const MechanismFormulas& formulas_;
+  const CodeTextOptions& options_;
+  const std::vector<TestState>& states_;
+  const std::vector<TestState>& open_;
+  std::vector<Found> found_;  ///< at the first `compared_` states, then at open ones
+  size_t compared_ = 0;
+};
 
 }  // namespace mbv

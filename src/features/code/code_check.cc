@@ -1,4 +1,4 @@
-#include "features/code/code_check.h"
+#include "features/code/code.h"
 
 #include <fmt/format.h>
 #include <Eigen/QR>
@@ -565,8 +565,7 @@ std::string CodeCheck::Slip(CodeReference* reference) const {
     if (close(found_[i].actuators, states_[i].actuators)) continue;
     if (ClosesOtherwise(states_[i].q, found_[i].actuators)) {
       return "another branch: the loops close with its positions, too, in an assembly that the "
-             "home "
-             "pose does not lead to";
+             "home pose does not lead to";
     }
     break;
   }

@@ -2,11 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "base/json_text.h"
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "cli/cli.h"
@@ -15,9 +13,6 @@
 #include "cli/terminal.h"
 #include "features/code/code.h"
 #include "model_file/load_model.h"
-#include "model_file/yaml/units.h"
-#include "scenario/find_model.h"
-#include "verify/model_text.h"
 
 namespace mbv {
 namespace {
@@ -114,8 +109,7 @@ void AddCodeCommand(CLI::App* app, int* exit_code) {
   SetFooter(
       code,
       {"code delta",
-       "code ankle.yaml --coordinates pitch,roll --range pitch_deg=-40:30 "
-       "--range roll_deg=-15:15",
+       "code ankle.yaml --coordinates pitch,roll --range pitch_deg=-40:30 --range roll_deg=-15:15",
        "code ankle.yaml --coordinates pitch,roll --check mine.h"},
       "0 the code agrees, 1 it differs, 2 bad input, 3 results could not be written, 4 internal "
       "error");

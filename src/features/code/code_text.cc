@@ -134,7 +134,6 @@ constexpr const char* kPythonAlgebra = R"code(
 def _sign(a, least):
     return 1.0 if a > least else (-1.0 if a < -least else 0.0)
 
-
 def _factor(a, n):
     """L U of a matrix by rows, in place: the row exchanges, or None where it is singular."""
     largest = max(abs(value) for value in a)
@@ -154,7 +153,6 @@ def _factor(a, n):
                 a[i * n + j] -= f * a[k * n + j]
     return pivot
 
-
 def _solve(lu, pivot, n, b):
     """b becomes the solution of a y = b."""
     for i in range(n):
@@ -166,7 +164,6 @@ def _solve(lu, pivot, n, b):
         for j in range(i + 1, n):
             b[i] -= lu[i * n + j] * b[j]
         b[i] /= lu[i * n + i]
-
 
 def _turn(x, at, a, b, c):
     """The unit quaternion w, x, y, z from x[at] on, turned by a small rotation in its own axes."""
@@ -1005,7 +1002,6 @@ def _prepare(p):
                 p.G[rates[i] * N + k] = r[i]
     return True
 
-
 def _close(p, to, start, reach, take):
     for halvings in range(7):
         parts, x, status = 2 ** halvings, list(p.x), OK
@@ -1029,12 +1025,10 @@ def _close(p, to, start, reach, take):
     p.__dict__.update(found.__dict__)
     return OK
 
-
 def close(p, q):
     """To the coordinates from the pose at hand, by a way so short that the branch is kept. Where
     that fails, p stays as it was."""
     return _close(p, list(q), p.q, _reach, lambda x: list(q))
-
 
 def actuators(p):
     """Their positions."""
@@ -1066,13 +1060,11 @@ def _motion(p, v, a):
             du[rate] = r[i]
     return u, du
 
-
 def jacobian(p):
     """Rates of the actuators per rate of q: a list per actuator."""
     c = _actuator_rates(p.x, p.t)
     return [[sum(c[at] * p.G[rate * N + k] for rate, at in parts) for k in range(N)]
             for parts in _ACTUATORS]
-
 
 def actuator_motion(p, v, a):
     """Rates and accelerations of the actuators."""
@@ -1080,7 +1072,6 @@ def actuator_motion(p, v, a):
     c, bias = _actuator_rates(p.x, p.t), _actuator_bias(p.x, p.t, u)
     return ([sum(c[at] * u[rate] for rate, at in parts) for parts in _ACTUATORS],
             [b + sum(c[at] * du[rate] for rate, at in parts) for b, parts in zip(bias, _ACTUATORS)])
-
 
 def jacobian_rate(p, v):
     """Time derivative of the Jacobian at rates v."""
@@ -1188,7 +1179,6 @@ def inverse_dynamics(p, v, a, more=None):
     Line("\n\n_TESTS = [  # q, v, a, more, positions, forces");
     text_ += TestRows("[", "]", "    ");
     Fixed(R"code(]
-
 
 def self_test():
     """The largest difference from what the reference of mbverify found at some states, by the

@@ -693,7 +693,7 @@ class FormulaMaker {
     x = made_->x_home;
     q = closure->home;
     for (int pose = 0; pose <= kGenericPoses; ++pose) {
-      if (pose > 0) {  // a step in all freedoms, then back into the loops
+      if (pose > 0) {  // a step in all degrees of freedom, then back into the loops
         VecX free = VecX::NullaryExpr(n, [&] { return spread(random); });
         for (int pass = 0; pass < 8; ++pass) {
           evaluate();
@@ -952,7 +952,7 @@ class FormulaMaker {
                           : rate_[static_cast<size_t>(element.joint)]
                                  [static_cast<size_t>(element.coordinate)];
         if (k < 0) {
-          Unsupported(Described(m_, element) + " acts on a ball that closes a loop");
+          Unsupported(Described(m_, element) + " acts on a spherical joint that closes a loop");
           continue;
         }
         v = made_->u[static_cast<size_t>(k)];

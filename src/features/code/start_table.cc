@@ -1,4 +1,4 @@
-#include "features/code/start_table.h"
+#include "features/code/code.h"
 
 #include <fmt/format.h>
 #include <Eigen/LU>
@@ -1013,7 +1013,8 @@ StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low, co
   for (const ClosureBlock& block : formulas.closure.blocks) {
     for (const int k : block.rates) {
       if (formulas.rates[static_cast<size_t>(k)].ball >= 0) {
-        *why = "a ball is searched whose turn has no coordinates without singularity";
+        *why =
+            "a spherical joint is searched whose rotation has no coordinates without singularity";
       }
     }
     if (block.rates.size() > kLargestBlock) {

@@ -1,4 +1,4 @@
-#include "features/convergence/convergence_report.h"
+#include "features/convergence/converge.h"
 
 #include <fmt/format.h>
 #include <cmath>
@@ -93,7 +93,7 @@ double CpuOf(const ConvergencePoint& p) { return p.cpu_s; }
 // C x^order through the coarsest fitted point, over the range of the series.
 PlotLine SlopeLine(const ConvergenceSeries& series, Abscissa x, double order,
                    const std::string& label) {
-  PlotLine line{.label = label, .points = {}};
+  PlotLine line{.label = label};
   const auto at = static_cast<size_t>(series.fit.first_fitted());
   const double error = JudgedErrors(series)[at];
   for (const ConvergencePoint* p : {&series.points.front(), &series.points.back()}) {
@@ -103,7 +103,7 @@ PlotLine SlopeLine(const ConvergenceSeries& series, Abscissa x, double order,
 }
 
 void AddSeries(const ConvergenceSeries& series, Abscissa x, LinePlot* plot) {
-  PlotLine line{.label = series.title, .points = {}, .markers = true};
+  PlotLine line{.label = series.title, .markers = true};
   if (series.by_changes) line.label += " (changes)";
   const std::vector<double> errors = JudgedErrors(series);
   for (size_t i = 0; i < errors.size(); ++i)
@@ -169,8 +169,7 @@ std::vector<std::pair<std::string, std::string>> ConvergencePlots(const Converge
                     .x_label = x_label,
                     .y_label = "drive-force error, RMS / RMS force",
                     .log_x = true,
-                    .log_y = true,
-                    .lines = {}};
+                    .log_y = true};
   };
   LinePlot step = plot("step", "step [s]"), cpu = plot("processor time", "processor time [s]"),
            constant = plot("constraint time constant", "time constant [s]");

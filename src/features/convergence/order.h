@@ -13,7 +13,7 @@
 // Orders of convergence from errors at several steps, and Richardson's extrapolation.
 //
 // An error C h^p is a straight line of slope p in logarithmic axes. Coarse steps that are not yet
-// in the asymptotic range bend it at one end, round-off at the other; the fit takes what lies
+// in the asymptotic range curve it at one end, round-off at the other; the fit takes what lies
 // between.
 
 namespace mbv {

@@ -8,14 +8,12 @@
 #include <memory>
 
 #include "base/json_text.h"
-#include "base/markup.h"
 #include "base/text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "comparison/verdict.h"
-#include "features/engines/upgrade.h"
 #include "features/run/run_scenario.h"
 #include "report/page.h"
 

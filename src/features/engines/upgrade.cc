@@ -1,16 +1,14 @@
-#include "features/engines/upgrade.h"
+#include "features/engines/crosscheck.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <memory>
 
 #include "base/json_text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
-#include "cli/options.h"
 #include "cli/terminal.h"
 #include "external/motion_text.h"
 #include "external/witness_answer.h"
@@ -219,9 +217,7 @@ class UpgradeRun {
     }
     report_.forces.push_back({.how = "mj_forward at these states",
                               .nrmse_old = ErrorAt(samples, times_s, old_forces),
-                              .nrmse_new = ErrorAt(samples, times_s, new_forces),
-                              .why_old = {},
-                              .why_new = {}});
+                              .nrmse_new = ErrorAt(samples, times_s, new_forces)});
     return "";
   }
 
@@ -364,7 +360,7 @@ void Widen(const SurveyedState& state, const RowMeasures& now, Eigen::Index row,
 }
 
 RowChange ChangeOf(const std::string& kind, const RowSurvey& survey, const RowAnswer& answer) {
-  RowChange change{.kind = kind, .softness_least = HUGE_VAL, .softness_most = 0.0, .why = {}};
+  RowChange change{.kind = kind, .softness_least = HUGE_VAL, .softness_most = 0.0};
   for (size_t row = 0; row < survey.kinds.size(); ++row) {
     if (survey.kinds[row] != kind) continue;
     ++change.rows;

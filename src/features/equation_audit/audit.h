@@ -2,11 +2,15 @@
 // against an independent computation over seeded states.
 #pragma once
 
+#include <cmath>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/diagnostics.h"
 #include "report/html_report.h"
 
 namespace mbv {
@@ -80,5 +84,66 @@ enum class AuditNumbers { kStable, kMeasured };
 [[nodiscard]] std::string ToJson(const HtmlAudit& audit);
 /// Empty when the text is not what ToJson() wrote.
 [[nodiscard]] std::optional<HtmlAudit> AuditFromJson(const std::string& text);
+
+// The audit of the equations of a file: each numbered equation against the reference at random
+// states, and the usual slips of those that are wrong.
+
+struct FileAuditOptions {
+  bool search = true;      ///< for slips
+  int samples = 0;         ///< states; 0: as many as the file says
+  std::string model = {};  ///< in the place of the file's own; "": that one
+  std::function<void(const std::string& equation, double fraction)> progress = {};
+};
+
+/// Empty after a finding that leaves nothing to say. A print that cannot be evaluated is a row;
+/// functions that are missing, names and quantities that are unknown, are errors.
+[[nodiscard]] std::optional<AuditTable> AuditFile(const std::string& file,
+                                                  const FileAuditOptions& options,
+                                                  Diagnostics* diagnostics);
+
+// RowMeter: collects the residuals of one equation over many states into an AuditRow.
+
+/// A row's texts and limit, before anything is measured.
+inline AuditRow TextRow(std::string equation, std::string printed, std::string corrected,
+                        std::string unit, double limit, std::string note) {
+  AuditRow row;
+  row.equation = std::move(equation);
+  row.printed = std::move(printed);
+  row.corrected = std::move(corrected);
+  row.unit = std::move(unit);
+  row.limit = limit;
+  row.note = std::move(note);
+  return row;
+}
+
+class RowMeter {
+ public:
+  /// `row` carries the texts, unit and limit; its residuals and scale are measured here.
+  explicit RowMeter(AuditRow row) : row_(std::move(row)) {
+    row_.residual_printed = row_.residual_corrected = row_.scale = 0.0;
+  }
+
+  /// One state of an equation that is right as printed.
+  void Add(double truth, double printed) { Add(truth, printed, printed); }
+  /// One state of an equation that needs a correction.
+  void Add(double truth, double printed, double corrected) {
+    Raise(std::abs(printed - truth), &row_.residual_printed);
+    Raise(std::abs(corrected - truth), &row_.residual_corrected);
+    Raise(std::abs(truth), &row_.scale);
+  }
+
+  [[nodiscard]] AuditRow Finish() {
+    row_.verdict = VerdictOf(row_);
+    return row_;
+  }
+
+ private:
+  // A NaN sticks, so that it can never look like agreement.
+  static void Raise(double value, double* largest) {
+    if (!(value <= *largest) && !std::isnan(*largest)) *largest = value;
+  }
+
+  AuditRow row_;
+};
 
 }  // namespace mbv

@@ -5,8 +5,8 @@
 #include "analytic/cabin_robot/closed_form.h"
 #include "analytic/cabin_robot/stiffness.h"
 #include "base/demand.h"
+#include "features/equation_audit/audit.h"
 #include "features/equation_audit/cabin_robot_audit.h"
-#include "features/equation_audit/row_meter.h"
 #include "features/equation_audit/stiffness_truth.h"
 #include "math/spatial.h"
 #include "reference/reference.h"
@@ -51,7 +51,7 @@ Load ToolLoad(const Mechanism& mechanism) {
 
 VecX ClosedFormForces(const Mechanism& mechanism, const Motion& motion, double t) {
   Diagnostics diagnostics;
-  const auto form = MakeCabinRobot(mechanism, motion, {}, &diagnostics);
+  const auto form = cabin_robot::MakeClosedForm(mechanism, motion, {}, &diagnostics);
   MBV_DEMAND(form != nullptr, diagnostics.Text());
   CommandSample command;
   EvaluateMotion(motion, t, &command);
@@ -124,10 +124,10 @@ std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism, const Mechanism& 
 
 namespace {
 
-using cabin::LimbForm;
-using cabin::StiffnessParameters;
-using cabin::StiffnessPose;
-using cabin::ToolStiffness;
+using cabin_robot::LimbForm;
+using cabin_robot::StiffnessParameters;
+using cabin_robot::StiffnessPose;
+using cabin_robot::ToolStiffness;
 using stiffness_audit::AddMatrix;
 using stiffness_audit::MatrixKind;
 
@@ -200,17 +200,18 @@ std::vector<AuditRow> BeamRows(const Mechanism& m, const StiffnessParameters& p)
               "and exact to 0.01 % from b/h = 3");
   usual.approximation = 0.018;  // of 0.141 for a square
   RowMeter torsion(usual);
-  const std::array<const char*, cabin::kStiffBeams> names = {"AB.AE", "CD",   "EF",  "column",
-                                                             "arm",   "rail", "tool"};
-  for (int k = 0; k < cabin::kStiffBeams; ++k) {
+  const std::array<const char*, cabin_robot::kStiffBeams> names = {"AB.AE", "CD",   "EF",  "column",
+                                                                   "arm",   "rail", "tool"};
+  for (int k = 0; k < cabin_robot::kStiffBeams; ++k) {
     const Beam& beam = BeamOf(m, names[static_cast<size_t>(k)]);
-    const Mat6 C = Swapped(BeamCompliance(p, static_cast<cabin::StiffBeam>(k), beam.length()));
+    const Mat6 C =
+        Swapped(BeamCompliance(p, static_cast<cabin_robot::StiffBeam>(k), beam.length()));
     AddMatrix(&beams, MatrixKind::kCompliance, kLength,
               stiffness_audit::CantileverCompliance(beam, beam.length()), C, C);
-    const cabin::RectSection& s = p.sections[static_cast<size_t>(k)];
+    const cabin_robot::RectSection& s = p.sections[static_cast<size_t>(k)];
     const double unit = s.b * s.h * s.h * s.h;
-    torsion.Add(beam.section.torsion / unit, cabin::TorsionConstant(s.b, s.h, true) / unit,
-                cabin::TorsionConstant(s.b, s.h, false) / unit);
+    torsion.Add(beam.section.torsion / unit, cabin_robot::TorsionConstant(s.b, s.h, true) / unit,
+                cabin_robot::TorsionConstant(s.b, s.h, false) / unit);
   }
   return {beams.Finish(), torsion.Finish()};
 }
@@ -227,7 +228,7 @@ AuditRow StrutRow(const StiffnessParameters& p, const std::vector<State>& states
       balance << 1, 0, -std::cos(psi), 0, 1, std::sin(psi), 0, 0, std::sin(psi) * p.planar.L1 / 2;
       const Vec3 reactions = balance.inverse() * Vec3(0, F_x2, F_x2 * p.planar.L1 - M_z);
       meter.Add(reactions[2],
-                cabin::StrutForce(p.planar.L1, psi - std::numbers::pi / 2, F_x2, M_z));
+                cabin_robot::StrutForce(p.planar.L1, psi - std::numbers::pi / 2, F_x2, M_z));
     }
   }
   return meter.Finish();
@@ -244,7 +245,7 @@ AuditRow StrutLimbRow(const StiffnessParameters& p, const std::vector<State>& st
     const Mat3 axes = RotZ(state.right.planar.alpha.p);
     const Mat6 truth = stiffness_audit::InAxes(
         stiffness_audit::ComplianceAt(limb, state.X_WB, "AB", Vec3(p.planar.L1, 0, 0)), axes);
-    const cabin::StrutLimb strut =
+    const cabin_robot::StrutLimb strut =
         StrutLimbCompliance(p, state.right.planar.alpha.p, state.right.planar.epsilon.p);
     Mat6 C = Mat6::Zero();  // rotation first: θz, x, y in the plane; θx, θy, z across it
     const std::array<int, 3> in = {3, 4, 2}, out = {5, 0, 1};
@@ -261,14 +262,17 @@ AuditRow StrutLimbRow(const StiffnessParameters& p, const std::vector<State>& st
 // Platform on one limb: the hinges carry no moment about z.
 std::vector<AuditRow> LimbRows(const StiffnessParameters& p, const std::vector<State>& states) {
   RowMeter strut(TextRow("(65) K_AB", "C_AB⁻¹ of (61)", "no moment about z at B: rank 5", "N/m",
-                         Limit(5e8), "platform on limb AB + EF alone; the inverse welds hinge B"));
+                         Limit(5e8),
+                         "platform on limb AB + EF alone; the inverse welds revolute joint B"));
   RowMeter link(TextRow("(65) K_CD", "C_CD⁻¹ of (54)", "EA/L3 and (z, θx, θy) only: rank 4", "N/m",
-                        Limit(1e9), "platform on link CD alone; the inverse welds hinges C and D"));
+                        Limit(1e9),
+                        "platform on link CD alone; the inverse welds revolute joints C and D"));
   for (const State& state : states) {
-    const cabin::PlanarState& s = state.right.planar;
+    const cabin_robot::PlanarState& s = state.right.planar;
     const Mat3 R_2 = RotZ(state.pose.gamma);
     const auto on_platform = [](const Mat3& R, const Vec3& r, const Mat6& K) {
-      return Swapped(cabin::LimbForceTransform(R, r) * K * cabin::LimbTransform(R, r).inverse());
+      return Swapped(cabin_robot::LimbForceTransform(R, r) * K *
+                     cabin_robot::LimbTransform(R, r).inverse());
     };
     const auto truth = [&](const std::vector<std::string>& open) {
       return stiffness_audit::StiffnessAt(stiffness_audit::Opened(state.m, open), state.X_WB,
@@ -282,9 +286,10 @@ std::vector<AuditRow> LimbRows(const StiffnessParameters& p, const std::vector<S
         &strut, MatrixKind::kStiffness, kLength, truth({"C", "B2", "C2"}),
         on_platform(R_AB, r_B, PrintedLimbCompliance(p, theta).inverse()),
         on_platform(R_AB, r_B, StrutLimbStiffness(StrutLimbCompliance(p, s.alpha.p, s.epsilon.p))));
-    AddMatrix(&link, MatrixKind::kStiffness, kLength, truth({"B", "B2", "C2"}),
-              on_platform(R_CD, r_C, BeamCompliance(p, cabin::kBeamCD, p.planar.L3).inverse()),
-              on_platform(R_CD, r_C, LinkLimbStiffness(p)));
+    AddMatrix(
+        &link, MatrixKind::kStiffness, kLength, truth({"B", "B2", "C2"}),
+        on_platform(R_CD, r_C, BeamCompliance(p, cabin_robot::kBeamCD, p.planar.L3).inverse()),
+        on_platform(R_CD, r_C, LinkLimbStiffness(p)));
   }
   return {strut.Finish(), link.Finish()};
 }
@@ -297,8 +302,7 @@ std::vector<AuditRow> ChainRows(const std::vector<State>& states) {
                         "summed over the five parts of the text"));
   RowMeter loads(
       TextRow("Table 2", "limb model (61), said to be within 15 %", "as corrected", "m", 1e-13,
-              "displacements of the end effector under single forces of 1000 N, C of the "
-              "frame"));
+              "displacements of the end effector under single forces of 1000 N, C of the frame"));
   for (const State& state : states) {
     const Mat6 K = stiffness_audit::StiffnessAt(state.m, state.X_WB, "platform");
     const Mat6 K_form = Swapped(state.right.K_platform);

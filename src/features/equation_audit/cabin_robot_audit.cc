@@ -6,7 +6,7 @@
 #include "analytic/cabin_robot/position.h"
 #include "analytic/cabin_robot/stiffness.h"
 #include "base/demand.h"
-#include "features/equation_audit/row_meter.h"
+#include "features/equation_audit/audit.h"
 #include "features/equation_audit/stiffness_truth.h"
 #include "model_file/load_model.h"
 
@@ -91,14 +91,12 @@ AuditTable AuditCabinRobot(const std::string& models_dir) {
       "Liu Yi, Yao Jiantao, Guo Yutong, Yi Wangmin, Zhao Yongsheng, Design and analysis of hybrid "
       "cabin assembly attitude adjustment robot system, J. of National University of Defense "
       "Technology 47(2), 2025 (kinematics, dynamics and stiffness; directions of the figures are "
-      "inferred "
-      "from "
-      "the equations)";
+      "inferred from the equations)";
   for (auto rows :
        {cabin_audit::PositionRows(lengths, lengths), cabin_audit::WristRows(lengths, lengths),
         cabin_audit::VelocityRows(lengths, lengths),
         cabin_audit::DynamicsRows(*model.mechanism, *model.mechanism),
-        cabin_audit::StiffnessRows(models_dir, cabin::StiffnessParametersOf(elastic))}) {
+        cabin_audit::StiffnessRows(models_dir, cabin_robot::StiffnessParametersOf(elastic))}) {
     for (AuditRow& row : rows) table.rows.push_back(std::move(row));
   }
   return table;
@@ -315,11 +313,11 @@ AuditRow AccelerationRow(const Lengths& l, const Lengths& truth,
       return Vec3(q.K().x(), q.K().y(), q.gamma());
     };
     const Vec3 a = SecondDifference(pose, kAccelerationStep);
-    cabin::PlanarState s;
+    cabin_robot::PlanarState s;
     s.X1 = {m.x[0], m.v[0], m.a[0]};
     s.X2 = {m.x[1], m.v[1], m.a[1]};
     s.X3 = {m.x[2], m.v[2], m.a[2]};
-    const bool ok = cabin::SolveForward({l.L1, l.L2, l.L3, l.L4}, &s).ok();
+    const bool ok = cabin_robot::SolveForward({l.L1, l.L2, l.L3, l.L4}, &s).ok();
     const Vec3 form(s.X.a, s.Y.a, s.gamma.a);
     for (int c = 0; c < 3; ++c) meter.Add(a[c], ok ? form[c] : kNan);
   }

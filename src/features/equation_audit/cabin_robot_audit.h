@@ -54,8 +54,8 @@ struct Lengths {
                                                  const Mechanism& truth);
 /// Equations (54)–(75) and Table 2, against frame elements; `models_dir` holds
 /// cabin_robot/elastic.yaml.
-[[nodiscard]] std::vector<AuditRow> StiffnessRows(const std::string& models_dir,
-                                                  const cabin::StiffnessParameters& parameters);
+[[nodiscard]] std::vector<AuditRow> StiffnessRows(
+    const std::string& models_dir, const cabin_robot::StiffnessParameters& parameters);
 
 // The planar linkage closed by Newton's method on its five pin positions: the audit's independent
 // computation. No angle and no formula of the paper enters; only the rod lengths.

@@ -3,8 +3,8 @@
 #include <numbers>
 #include <random>
 
+#include "features/equation_audit/audit.h"
 #include "features/equation_audit/cabin_robot_audit.h"
-#include "features/equation_audit/row_meter.h"
 #include "math/spatial.h"
 
 namespace mbv::cabin_audit {

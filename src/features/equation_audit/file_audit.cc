@@ -1,4 +1,4 @@
-#include "features/equation_audit/file_audit.h"
+#include "features/equation_audit/audit.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <mutex>
 #include <random>
-#include <set>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -192,7 +191,7 @@ class FileAudit {
     }
     const std::vector<std::string> names = NamesOf(all);
     for (const std::string& text : info_.states.coordinates) {
-      Command command{.name = text, .terms = {}, .profile = {}};
+      Command command{.name = text};
       // "limb1.drive - limb1.drive_p"
       const size_t minus = text.find(" - ");
       for (const std::string& name :
@@ -237,7 +236,7 @@ class FileAudit {
 
   void CheckNamed(const std::string& name) {
     if (Contains(info_.states.coordinates, name)) return;
-    Error(0, fmt::format("states: '{}' is none of the coordinates", name),
+    Error(0, fmt::format("states: '{}' is not one of the coordinates", name),
           DidYouMean(name, info_.states.coordinates));
   }
 
@@ -559,7 +558,7 @@ class FileAudit {
   bool SizesFit(const EquationInfo& equation, const AuditValues& values, Case* made) {
     AuditValues& truth = made->truth;
     for (size_t k = 0; k < values.size() && k < truth.size(); ++k) {
-      // So many numbers as there are must vanish.
+      // As many numbers as there are must vanish.
       if (made->vanishes) truth[k].assign(std::max<size_t>(values[k].size(), 1), 0.0);
       if (values[k].size() == truth[k].size()) continue;
       Error(equation.line, fmt::format("{}: gives {} numbers, and {} has {}", equation.number,

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "analytic/stabilizing_platform/dynamics.h"
-#include "features/equation_audit/row_meter.h"
+#include "features/equation_audit/audit.h"
 #include "features/equation_audit/stabilizing_platform_audit.h"
 
 namespace mbv::platform_audit {
@@ -21,13 +21,14 @@ sp::Evaluation Evaluate(const Case& c, sp::Model model, double t) {
 }
 
 void WrenchRows(const Case& c, std::vector<AuditRow>* rows) {
-  RowMeter wrench({.equation = "(22)",
-                   .printed = "W^I = −(N A − ad(V)ᵀ N V), W^G = (r × m g; m g)",
-                   .limit = 10 * kForceLimit,
-                   .unit = "N, N m",
-                   .note =
-                       "−W^I − W^G against the sum of the reference's ball forces; one V carries "
-                       "a stray T in print"});
+  RowMeter wrench(
+      {.equation = "(22)",
+       .printed = "W^I = −(N A − ad(V)ᵀ N V), W^G = (r × m g; m g)",
+       .limit = 10 * kForceLimit,
+       .unit = "N, N m",
+       .note =
+           "−W^I − W^G against the sum of the reference's spherical-joint forces; one V carries "
+           "a stray T in print"});
   for (size_t n = 0; n < c.truth.size(); ++n) {
     const sp::Evaluation& e = c.closed[n];
     Vec6 sum = Vec6::Zero();
@@ -44,26 +45,28 @@ void WrenchRows(const Case& c, std::vector<AuditRow>* rows) {
 }
 
 void BalanceRows(const Case& full, const Case& massless, std::vector<AuditRow>* rows) {
-  RowMeter light({.equation = "(21), massless links",
-                  .printed = "[S1 … S6] f = −W^G − W^I",
-                  .limit = kForceLimit,
-                  .unit = "N",
-                  .note = "f_1 … f_6 against the reference's balls with massless links"});
-  RowMeter heavy({.equation = "(21), links with mass",
-                  .erratum = "E7",
-                  .printed = "[S1 … S6] f = −W^G − W^I",
-                  .corrected = "… − Σ f_X,i (B_i × X_i; X_i)",
-                  .limit = kForceLimit,
-                  .unit = "N",
-                  .note = "f_1 … f_6 against the reference's balls; a limb with mass also loads "
-                          "along X"});
+  RowMeter light(
+      {.equation = "(21), massless links",
+       .printed = "[S1 … S6] f = −W^G − W^I",
+       .limit = kForceLimit,
+       .unit = "N",
+       .note = "f_1 … f_6 against the reference's spherical joints with massless links"});
+  RowMeter heavy(
+      {.equation = "(21), links with mass",
+       .erratum = "E7",
+       .printed = "[S1 … S6] f = −W^G − W^I",
+       .corrected = "… − Σ f_X,i (B_i × X_i; X_i)",
+       .limit = kForceLimit,
+       .unit = "N",
+       .note = "f_1 … f_6 against the reference's spherical joints; a limb with mass also loads "
+               "along X"});
   RowMeter f_X({.equation = "(21), f_X",
                 .erratum = "E7",
                 .printed = "0 (not in the equation)",
                 .corrected = "f_X,i = −Σ M_Y,i/l_i",
                 .limit = kForceLimit,
                 .unit = "N",
-                .note = "force along X at the reference's balls"});
+                .note = "force along X at the reference's spherical joints"});
   for (size_t n = 0; n < full.truth.size(); ++n) {
     const sp::Evaluation text = Evaluate(full, sp::Model::kPaperText, full.truth[n].time_s);
     for (int i = 0; i < 3; ++i) {
@@ -86,13 +89,14 @@ int RankOf(const sp::LimbSystem& system) {
 }
 
 void LimbSystemRows(const Case& c, std::vector<AuditRow>* rows) {
-  RowMeter rank({.equation = "30 equations, rank",
-                 .erratum = "E8",
-                 .printed = "30 unknowns, 30 equations",
-                 .corrected = "R22' as a ball; platform acts on the cross along and about X",
-                 .limit = 0,
-                 .unit = "1",
-                 .note = "30 − rank; the printed loop can carry M_Z and an X force unnoticed"});
+  RowMeter rank(
+      {.equation = "30 equations, rank",
+       .erratum = "E8",
+       .printed = "30 unknowns, 30 equations",
+       .corrected = "R22' as a spherical joint; platform acts on the cross along and about X",
+       .limit = 0,
+       .unit = "1",
+       .note = "30 − rank; the printed loop can carry M_Z and an X force unnoticed"});
   RowMeter solvable({.equation = "30 equations, solvable",
                      .erratum = "E8",
                      .printed = "30 unknowns, 30 equations",

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "analytic/stabilizing_platform/position.h"
-#include "features/equation_audit/row_meter.h"
+#include "features/equation_audit/audit.h"
 #include "features/equation_audit/stabilizing_platform_audit.h"
 
 namespace mbv::platform_audit {

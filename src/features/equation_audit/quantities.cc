@@ -369,8 +369,7 @@ Argument AuditQuantity::At(const AuditState& state) const {
                       kind_ != Kind::kGravity && kind_ != Kind::kDriveJacobian;
   Argument argument{
       .rows = scalar ? 0 : static_cast<int>(whole.rows()),
-      .columns = whole.cols() == 1 && kind_ != Kind::kMass ? 0 : static_cast<int>(whole.cols()),
-      .values = {}};
+      .columns = whole.cols() == 1 && kind_ != Kind::kMass ? 0 : static_cast<int>(whole.cols())};
   for (Eigen::Index i = 0; i < whole.rows(); ++i) {
     for (Eigen::Index k = 0; k < whole.cols(); ++k) argument.values.push_back(whole(i, k));
   }

@@ -8,24 +8,25 @@
 namespace mbv::scara_audit {
 namespace {
 
-using scara::MotorAxis;
+using scara_robot::MotorAxis;
 
 /// −d/dt (I ω) of a body with solid-bar inertia, x along the bar, from its pose and rates.
-Vec3 InertiaMoment(const scara::BarInertia& bar, const Mat3& R, const Vec3& omega,
+Vec3 InertiaMoment(const scara_robot::BarInertia& bar, const Mat3& R, const Vec3& omega,
                    const Vec3& domega) {
   const Vec3 diagonal(bar.axial, bar.transverse, bar.transverse);
   const Vec3 w = R.transpose() * omega, dw = R.transpose() * domega;
   return -(R * (diagonal.cwiseProduct(dw) + w.cross(Vec3(diagonal.cwiseProduct(w)))));
 }
 
-scara::BarInertia ArmInertia(const scara::Parameters& p) {
-  return scara::SolidBar(p.m_arm, p.arm_radius, p.l1);
+scara_robot::BarInertia ArmInertia(const scara_robot::Parameters& p) {
+  return scara_robot::SolidBar(p.m_arm, p.arm_radius, p.l1);
 }
-scara::BarInertia RodInertia(const scara::Parameters& p, int i) {
-  return scara::SolidBar(p.m_rods, p.rod_radius, p.rod_length(i));
+scara_robot::BarInertia RodInertia(const scara_robot::Parameters& p, int i) {
+  return scara_robot::SolidBar(p.m_rods, p.rod_radius, p.rod_length(i));
 }
 
-std::vector<AuditRow> InertiaRows(const scara::Parameters& p, const std::vector<State>& states) {
+std::vector<AuditRow> InertiaRows(const scara_robot::Parameters& p,
+                                  const std::vector<State>& states) {
   RowMeter Q({.equation = "(42)",
               .erratum = "E15",
               .printed = "Q = m_p g ẑ − m_p p̈",
@@ -41,16 +42,12 @@ std::vector<AuditRow> InertiaRows(const scara::Parameters& p, const std::vector<
               .unit = "N m",
               .note = "I_pz is not printed either; a square plate is assumed"});
   RowMeter arm({.equation = "(43)",
-                .erratum = {},
                 .printed = "Q_i1 = m_i1 (g − v̇_i1), T_i1 = −θ̈_i I ν_i − θ̇_i² ν_i (I ν_i)",
-                .corrected = {},
                 .limit = Limit(30.0),
                 .unit = "N, N m",
                 .note = "read with the lost cross and the dots on θ"});
   RowMeter rods({.equation = "(44), (45)",
-                 .erratum = {},
                  .printed = "Q_i2 = m_i2 (g − v̇_i2), T_i2 = −I ε̇_i − ε_i (I ε_i)",
-                 .corrected = {},
                  .limit = Limit(30.0),
                  .unit = "N, N m",
                  .note = "read with the lost dot and cross; ε with spin"});
@@ -61,9 +58,9 @@ std::vector<AuditRow> InertiaRows(const scara::Parameters& p, const std::vector<
     T.Add(-p.I_pz * state.domega_platform.z(), 0.0, -p.I_pz * state.rates.ddX[3]);
     for (int i = 0; i < kLimbs; ++i) {
       const LimbTruth& limb = state.limbs[i];
-      scara::LinkMotion links;
-      FillLinkMotion(p, state.position, state.rates, state.J_inverse, scara::RodModel::kFull, i,
-                     &links);
+      scara_robot::LinkMotion links;
+      FillLinkMotion(p, state.position, state.rates, state.J_inverse, scara_robot::RodModel::kFull,
+                     i, &links);
       const Vec3 Q1 = 2 * p.arm_com * p.m_arm * (g - links.dv_arm);
       AddAll(&arm, 2 * p.arm_com * p.m_arm * (g - limb.arm.a), Q1, Q1);
       // The arm turns about a principal axis: the second term vanishes.
@@ -73,7 +70,7 @@ std::vector<AuditRow> InertiaRows(const scara::Parameters& p, const std::vector<
       const Vec3 Q2 = p.m_rods * (g - links.dv_rod);
       AddAll(&rods, p.m_rods * (g - limb.rods.a), Q2, Q2);
       const Mat3 eta = state.position.eta[i] * state.position.eta[i].transpose();
-      const scara::BarInertia bar = RodInertia(p, i);
+      const scara_robot::BarInertia bar = RodInertia(p, i);
       const Mat3 I = bar.transverse * (Mat3::Identity() - eta) + bar.axial * eta;
       const Vec3 T2 = -I * links.domega - links.omega.cross(Vec3(I * links.omega));
       AddAll(&rods, InertiaMoment(bar, limb.R_rod, limb.omega_rod, limb.domega_rod), T2, T2);
@@ -87,7 +84,7 @@ struct VirtualPower {
   double drives = 0.0;
   double printed = 0.0, corrected = 0.0;
 };
-VirtualPower PowerOf(const scara::Parameters& p, const State& state) {
+VirtualPower PowerOf(const scara_robot::Parameters& p, const State& state) {
   const Vec3& g = p.gravity_W;
   const Vec3 v = state.P.v;
   VirtualPower power;
@@ -109,7 +106,7 @@ VirtualPower PowerOf(const scara::Parameters& p, const State& state) {
   return power;
 }
 
-AuditRow VirtualPowerRow(const scara::Parameters& p, const std::vector<State>& states) {
+AuditRow VirtualPowerRow(const scara_robot::Parameters& p, const std::vector<State>& states) {
   RowMeter meter({.equation = "(46)",
                   .erratum = "E17",
                   .printed = "Mᵀδθ + Fᵀδ(x, y, z) + Qᵀδ(x, y, z) + Σ(Qᵀδx + Tᵀδϑ) = 0",
@@ -130,7 +127,7 @@ AuditRow VirtualPowerRow(const scara::Parameters& p, const std::vector<State>& s
   return row;
 }
 
-std::vector<AuditRow> VirtualMotionRows(const scara::Parameters& p,
+std::vector<AuditRow> VirtualMotionRows(const scara_robot::Parameters& p,
                                         const std::vector<State>& states) {
   RowMeter platform({.equation = "(47) δX",
                      .erratum = "E19",
@@ -150,9 +147,9 @@ std::vector<AuditRow> VirtualMotionRows(const scara::Parameters& p,
     const Vec4& dtheta = state.rates.dtheta;
     AddAll(&platform, state.rates.dX, state.J * dtheta, state.J_inverse * dtheta);
     for (int i = 0; i < kLimbs; ++i) {
-      scara::LinkMotion links;
-      FillLinkMotion(p, state.position, state.rates, state.J_inverse, scara::RodModel::kThin, i,
-                     &links);
+      scara_robot::LinkMotion links;
+      FillLinkMotion(p, state.position, state.rates, state.J_inverse, scara_robot::RodModel::kThin,
+                     i, &links);
       AddAll(&arm, state.limbs[i].omega_arm, links.J_omega * dtheta, dtheta[i] * MotorAxis(i));
     }
   }
@@ -161,12 +158,12 @@ std::vector<AuditRow> VirtualMotionRows(const scara::Parameters& p,
 
 /// The most generous reading of (48): J⁻¹ for J, the factor θ_i dropped, the Jacobians of (31),
 /// (34) and (36) corrected.
-Vec4 PrintedTorques(const scara::Parameters& p, const State& state) {
+Vec4 PrintedTorques(const scara_robot::Parameters& p, const State& state) {
   const double g = -p.gravity_W.z();
   Vec4 M = -p.m_p * g * state.J_inverse.row(2).transpose();
   for (int i = 0; i < kLimbs; ++i) {
-    scara::LinkMotion links;
-    FillLinkMotion(p, state.position, state.rates, state.J_inverse, scara::RodModel::kThin, i,
+    scara_robot::LinkMotion links;
+    FillLinkMotion(p, state.position, state.rates, state.J_inverse, scara_robot::RodModel::kThin, i,
                    &links);
     M += g * (p.m_arm * links.J_arm + p.m_rods * links.J_rod).row(2).transpose();
     M -= p.m_arm * links.J_arm.transpose() * links.dv_arm;
@@ -177,7 +174,7 @@ Vec4 PrintedTorques(const scara::Parameters& p, const State& state) {
   return M;
 }
 
-AuditRow TorqueRow(const scara::Parameters& p, const std::vector<State>& states) {
+AuditRow TorqueRow(const scara_robot::Parameters& p, const std::vector<State>& states) {
   RowMeter meter({.equation = "(48)",
                   .erratum = "E21",
                   .printed = "M = (Σ m_ij J_ijᵀ − m_p Jᵀ ẑ) g + […] Ẋ + […] Ẍ",
@@ -199,7 +196,7 @@ AuditRow TorqueRow(const scara::Parameters& p, const std::vector<State>& states)
 
 }  // namespace
 
-std::vector<AuditRow> DynamicsRows(const scara::Parameters& parameters,
+std::vector<AuditRow> DynamicsRows(const scara_robot::Parameters& parameters,
                                    const std::vector<State>& states) {
   std::vector<AuditRow> rows = InertiaRows(parameters, states);
   rows.push_back(VirtualPowerRow(parameters, states));
@@ -212,9 +209,9 @@ std::vector<AuditRow> DynamicsRows(const scara::Parameters& parameters,
 
 namespace {
 
-using scara::PlatformStiffness;
-using scara::PrintedForms;
-using scara::StiffnessParameters;
+using scara_robot::PlatformStiffness;
+using scara_robot::PrintedForms;
+using scara_robot::StiffnessParameters;
 using stiffness_audit::AddMatrix;
 using stiffness_audit::MatrixKind;
 
@@ -285,16 +282,16 @@ Truth TruthAt(const std::string& models_dir, const StiffnessParameters& p, const
     truth.limbs[i] =
         stiffness_audit::StiffnessAt(stiffness_audit::Opened(m, others), X_WB, "platform");
     if (i >= 2) continue;
-    const std::string limb = scara::LimbName(i);
-    const Vec3 w = at.position.eta[i], h = scara::MotorAxis(i).cross(w).normalized();
+    const std::string limb = scara_robot::LimbName(i);
+    const Vec3 w = at.position.eta[i], h = scara_robot::MotorAxis(i).cross(w).normalized();
     Mat3 axes;
     axes << w, h, w.cross(h);
     const Mechanism rods = stiffness_audit::Clamped(stiffness_audit::Opened(m, {limb + ".hinge_D"}),
                                                     limb + ".hinge_C", X_WB);
     truth.rods[i] =
         stiffness_audit::InAxes(stiffness_audit::StiffnessAt(rods, X_WB, limb + ".hub_D"), axes);
-    truth.cos_q[i] = scara::MotorAxis(i).dot(w);
-    truth.sin_q[i] = scara::MotorAxis(i).dot(axes.col(2));
+    truth.cos_q[i] = scara_robot::MotorAxis(i).dot(w);
+    truth.sin_q[i] = scara_robot::MotorAxis(i).dot(axes.col(2));
   }
   return truth;
 }
@@ -408,7 +405,7 @@ AuditRow ParallelogramRow(const StiffnessParameters& p, const std::vector<Truth>
       const auto whole = [&](bool printed) {
         Mat6 K = Mat6::Zero();
         K.topLeftCorner<5, 5>() =
-            scara::ParallelogramStiffness(k, p.d, truth.sin_q[i], truth.cos_q[i], printed);
+            scara_robot::ParallelogramStiffness(k, p.d, truth.sin_q[i], truth.cos_q[i], printed);
         return K;
       };
       AddMatrix(&meter, MatrixKind::kStiffness, p.geometry.R, truth.rods[i], whole(true),
@@ -481,7 +478,7 @@ std::vector<AuditRow> MapRows(const std::string& models_dir, const StiffnessPara
   const auto kappa = [&](const Vec4& X) {
     PlatformStiffness at;
     (void)SolveStiffness(p, {}, X, &at);
-    return scara::IndicesOf(at.K, at.C).kappa_m;
+    return scara_robot::IndicesOf(at.K, at.C).kappa_m;
   };
   for (const auto& [x, y, z] :
        {std::array{-0.06, -0.02, -0.1}, {-0.05, -0.045, -0.19}, {0.02, -0.05, -0.19}}) {

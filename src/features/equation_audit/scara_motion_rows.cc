@@ -9,28 +9,24 @@
 namespace mbv::scara_audit {
 namespace {
 
-using scara::MotorAxis;
-using scara::Radial;
+using scara_robot::MotorAxis;
+using scara_robot::Radial;
 
 AuditRow TopologyRow(const Mechanism& mechanism) {
   RowMeter meter(
       {.equation = "F = Σf − Σξ",
-       .erratum = {},
        .printed = "(5 + 5 + 6 + 6) − (6 + 6 + 6) = 4",
-       .corrected = {},
        .limit = 0.0,
        .unit = "degrees of freedom",
        .note = "against the constraint rank of the model; f_i counts the degrees of freedom of a "
                "limb, not of a joint; the cross-bars are essential (6 without them)"});
-  meter.Add(AnalyseMobility(mechanism).dofs, scara::CountDofs().dofs);
+  meter.Add(AnalyseMobility(mechanism).dofs, scara_robot::CountDofs().dofs);
   return meter.Finish();
 }
 
 AuditRow OutputRow(const std::vector<State>& states) {
   RowMeter meter({.equation = "M_pa",
-                  .erratum = {},
                   .printed = "platform: three translations, one rotation about its normal",
-                  .corrected = {},
                   .limit = Limit(1.0),
                   .unit = "rad",
                   .note = "tilt of the platform under way in the model"});
@@ -42,9 +38,7 @@ AuditRow OutputRow(const std::vector<State>& states) {
 
 AuditRow PlateRow() {
   RowMeter meter({.equation = "Table 1, platform",
-                  .erratum = {},
                   .printed = "0.4677 kg",
-                  .corrected = {},
                   .limit = 1e-3,
                   .unit = "kg",
                   .note = "against a square steel plate of circumradius 50 mm, 12 mm thick"});
@@ -66,26 +60,21 @@ AuditRow DensityRow() {
   return meter.Finish();
 }
 
-std::vector<AuditRow> VectorRows(const scara::Parameters& p, const std::vector<State>& states) {
+std::vector<AuditRow> VectorRows(const scara_robot::Parameters& p,
+                                 const std::vector<State>& states) {
   const double limit = Limit(p.l1);
   RowMeter s({.equation = "(1)",
-              .erratum = {},
               .printed = "s_i = r [c(φ+α_i), s(φ+α_i), 0]",
-              .corrected = {},
               .limit = limit,
               .unit = "m",
               .note = "against p_PB of the model"});
   RowMeter r({.equation = "(2)",
-              .erratum = {},
               .printed = "r_i = R [cα_i, sα_i, 0]",
-              .corrected = {},
               .limit = limit,
               .unit = "m",
               .note = "against p_OA of the model"});
   RowMeter u({.equation = "(4)",
-              .erratum = {},
               .printed = "u_i = [cθ_i cα_i, cθ_i sα_i, −sθ_i]",
-              .corrected = {},
               .limit = limit / p.l1,
               .unit = "1",
               .note = "against the direction A_i → C_i"});
@@ -98,28 +87,22 @@ std::vector<AuditRow> VectorRows(const scara::Parameters& p, const std::vector<S
                  .note = "loop vector of limbs 1, 2 from the bodies' points; that the drawn robot "
                          "needs −e is measured in the row Fig. 8"});
   RowMeter six({.equation = "(6)",
-                .erratum = {},
                 .printed = "p + s_i = r_i + l1 u_i + l3 w_i",
-                .corrected = {},
                 .limit = limit,
                 .unit = "m",
                 .note = "loop vector of limbs 3, 4"});
   RowMeter seven({.equation = "(7), (8)",
-                  .erratum = {},
                   .printed = "(p + s_i − r_i − l1 u_i − e_i)² = l2², l3² without e_i",
-                  .corrected = {},
                   .limit = limit * p.l1,
                   .unit = "m²",
                   .note = "right once e_i is, see (3)"});
   RowMeter eta({.equation = "(22), (23)",
-                .erratum = {},
                 .printed = "v_i = (p + s_i − r_i − l1 u_i − e_i)/l2; w_i without e_i, /l3",
-                .corrected = {},
                 .limit = Limit(1.0),
                 .unit = "1",
                 .note = "right once e_i is, see (3); against the rods' axes"});
   for (const State& state : states) {
-    const scara::Position& at = state.position;
+    const scara_robot::Position& at = state.position;
     for (int i = 0; i < kLimbs; ++i) {
       const LimbTruth& limb = state.limbs[i];
       AddAll(&s, limb.B.p - state.P.p, at.s[i], at.s[i]);
@@ -148,7 +131,7 @@ struct Quadratic {
     return 2 * std::atan((-E - std::sqrt(E * E + F * F - G * G)) / (G - F));
   }
 };
-Quadratic QuadraticOf(const scara::Parameters& p, const State& state, int i, double sign_F,
+Quadratic QuadraticOf(const scara_robot::Parameters& p, const State& state, int i, double sign_F,
                       double sign_e) {
   const Vec3 e(0, 0, sign_e * p.drop(i));
   const Vec3 q = state.P.p + state.position.s[i] - p.R * Radial(i) - e;
@@ -157,7 +140,8 @@ Quadratic QuadraticOf(const scara::Parameters& p, const State& state, int i, dou
           q.squaredNorm() + p.l1 * p.l1 - L * L};
 }
 
-std::vector<AuditRow> InverseRows(const scara::Parameters& p, const std::vector<State>& states) {
+std::vector<AuditRow> InverseRows(const scara_robot::Parameters& p,
+                                  const std::vector<State>& states) {
   RowMeter nine({.equation = "(9)",
                  .erratum = "E3",
                  .printed = "E sθ + F cθ + G = 0, F = +2 l1 q·(cα x̂ + sα ŷ)",
@@ -170,8 +154,7 @@ std::vector<AuditRow> InverseRows(const scara::Parameters& p, const std::vector<
                 .printed = "θ = 2 atan[(−E − √(E² + F² − G²))/(G − F)] with (3) and (9) as printed",
                 .corrected = "the same with F and e corrected; minus is the outward branch",
                 .limit = Limit(1.0),
-                .unit = "rad",
-                .note = {}});
+                .unit = "rad"});
   double only_e = 0, only_F = 0;
   int no_root = 0;
   for (const State& state : states) {
@@ -197,7 +180,7 @@ std::vector<AuditRow> InverseRows(const scara::Parameters& p, const std::vector<
   return {row_nine, row_ten};
 }
 
-AuditRow CylinderRow(const scara::Parameters& p) {
+AuditRow CylinderRow(const scara_robot::Parameters& p) {
   RowMeter meter({.equation = "Fig. 8",
                   .erratum = "E2",
                   .printed = "cylinder of radius 100 mm, z −100 … −230 mm, with e_i = (0, 0, +e)",
@@ -206,11 +189,11 @@ AuditRow CylinderRow(const scara::Parameters& p) {
                   .unit = "share",
                   .note = "share of the cylinder reached at φ = 0 on a polar grid; the text's "
                           "height of 90 mm contradicts its 130 mm between top and bottom"});
-  scara::Parameters printed = p;
+  scara_robot::Parameters printed = p;
   printed.e = -printed.e;
-  const auto share = [](const scara::Parameters& parameters) {
-    const scara::CylinderCheck check =
-        CheckCylinder(parameters, scara::Limits{}, scara::CylinderSpace{}, 0.0, 14, 5, 24);
+  const auto share = [](const scara_robot::Parameters& parameters) {
+    const scara_robot::CylinderCheck check = CheckCylinder(
+        parameters, scara_robot::Limits{}, scara_robot::CylinderSpace{}, 0.0, 14, 5, 24);
     double sum = 0;
     for (const double layer : check.layer_reached) sum += layer;
     return sum / static_cast<double>(check.layer_reached.size());
@@ -219,7 +202,7 @@ AuditRow CylinderRow(const scara::Parameters& p) {
   return meter.Finish();
 }
 
-AuditRow ExampleRow(const scara::Parameters& p) {
+AuditRow ExampleRow(const scara_robot::Parameters& p) {
   RowMeter meter({.equation = "(49)",
                   .erratum = "E18",
                   .printed = "θ1 = θ3 = (π/15) s(0.2πt), θ2 = θ4 = −θ1, as absolute angles",
@@ -232,17 +215,17 @@ AuditRow ExampleRow(const scara::Parameters& p) {
                           "literal signs as increments from the centre leave within 0.3°"});
   const double amplitude = std::numbers::pi / 15;
   // The best closed pose at full amplitude as printed.
-  scara::Position printed;
+  scara_robot::Position printed;
   const RunSummary closed = SolveForwardPosition(
       p, Vec4(amplitude, -amplitude, amplitude, -amplitude), Vec4(0, 0, -p.e / 2, 0.7), &printed);
   const double z_printed = closed.ok() ? printed.X[2] : kNan;
   // The corrected reading over one period.
-  scara::Parameters home = p;
+  scara_robot::Parameters home = p;
   home.home_X = Vec4(-0.05, -0.05, -0.13, std::numbers::pi / 12);
-  scara::Position start, at;
+  scara_robot::Position start, at;
   double z_highest = -1.0;
   if (InversePosition(home, home.home_X, &start).ok()) {
-    scara::ForwardTracker tracker(home);
+    scara_robot::ForwardTracker tracker(home);
     for (int k = 0; k <= 40; ++k) {
       const double s = amplitude * std::sin(2 * std::numbers::pi * k / 40);
       const RunSummary run = tracker.Follow(start.theta + s * Vec4(1, 1, -1, -1), &at);
@@ -257,7 +240,8 @@ AuditRow ExampleRow(const scara::Parameters& p) {
 
 }  // namespace
 
-std::vector<AuditRow> PositionRows(const Mechanism& mechanism, const scara::Parameters& parameters,
+std::vector<AuditRow> PositionRows(const Mechanism& mechanism,
+                                   const scara_robot::Parameters& parameters,
                                    const std::vector<State>& states) {
   std::vector<AuditRow> rows = {TopologyRow(mechanism), OutputRow(states), DensityRow(),
                                 PlateRow()};
@@ -270,7 +254,7 @@ std::vector<AuditRow> PositionRows(const Mechanism& mechanism, const scara::Para
 
 namespace {
 
-using scara::MotorAxis;
+using scara_robot::MotorAxis;
 
 /// (30) with each of its errors optional; the transposes of R_i are always corrected (as printed
 /// the shapes do not fit).
@@ -279,9 +263,9 @@ struct PrintedErrors {
   bool rod_rate_for_axis = false;  ///< σ_i = angular velocity of the rod, for the motor axis
   bool l2_for_all = false;
 };
-Mat4 PrintedForm(const scara::Parameters& p, const State& state, int i,
+Mat4 PrintedForm(const scara_robot::Parameters& p, const State& state, int i,
                  const PrintedErrors& errors) {
-  const scara::Position& at = state.position;
+  const scara_robot::Position& at = state.position;
   const Vec3& eta = at.eta[i];
   const Vec3 sigma = errors.rod_rate_for_axis ? state.limbs[i].omega_rod : MotorAxis(i);
   const Vec3 sigma_u = sigma.cross(at.u[i]);
@@ -296,7 +280,8 @@ Mat4 PrintedForm(const scara::Parameters& p, const State& state, int i,
   return form / at.V[i];
 }
 
-Vec4 ProductWith(const scara::Parameters& p, const State& state, const PrintedErrors& errors) {
+Vec4 ProductWith(const scara_robot::Parameters& p, const State& state,
+                 const PrintedErrors& errors) {
   Vec4 f;
   for (int i = 0; i < kLimbs; ++i) {
     f[i] = state.rates.dX.dot(PrintedForm(p, state, i, errors) * state.rates.dX) / (p.l1 * p.l1);
@@ -304,11 +289,10 @@ Vec4 ProductWith(const scara::Parameters& p, const State& state, const PrintedEr
   return f;
 }
 
-std::vector<AuditRow> JacobianRows(const scara::Parameters& p, const std::vector<State>& states) {
+std::vector<AuditRow> JacobianRows(const scara_robot::Parameters& p,
+                                   const std::vector<State>& states) {
   RowMeter loops({.equation = "(24), (25)",
-                  .erratum = {},
                   .printed = "ṗ + ṡ_i = l1 θ̇_i (ν_i u_i) + l2 ε_i v_i; l3 ω_i w_i",
-                  .corrected = {},
                   .limit = Limit(3.0),
                   .unit = "m/s",
                   .note = "the cross signs are lost in print; against the model's velocities"});
@@ -320,9 +304,7 @@ std::vector<AuditRow> JacobianRows(const scara::Parameters& p, const std::vector
                       .unit = "m/s",
                       .note = "a lost dot; the next equation has it"});
   RowMeter inverse({.equation = "(28) J",
-                    .erratum = {},
                     .printed = "θ̇ = J Ẋ, J = J_x⁻¹ J_θ",
-                    .corrected = {},
                     .limit = Limit(30.0),
                     .unit = "rad/s",
                     .note = "J_x multiplies θ̇, unusual names; against the model's motor rates"});
@@ -334,7 +316,7 @@ std::vector<AuditRow> JacobianRows(const scara::Parameters& p, const std::vector
                     .unit = "m/s, rad/s",
                     .note = "a matrix cannot equal a vector; read as J⁻¹ J_x⁻¹ J_θ θ̇"});
   for (const State& state : states) {
-    const scara::Position& at = state.position;
+    const scara_robot::Position& at = state.position;
     const Vec4& dtheta = state.rates.dtheta;
     for (int i = 0; i < kLimbs; ++i) {
       const LimbTruth& limb = state.limbs[i];
@@ -353,7 +335,7 @@ std::vector<AuditRow> JacobianRows(const scara::Parameters& p, const std::vector
   return {loops.Finish(), projected.Finish(), inverse.Finish(), forward.Finish()};
 }
 
-std::vector<AuditRow> AccelerationRows(const scara::Parameters& p,
+std::vector<AuditRow> AccelerationRows(const scara_robot::Parameters& p,
                                        const std::vector<State>& states) {
   const double limit = Limit(1000.0);
   const std::string unit = "rad/s²";
@@ -368,8 +350,7 @@ std::vector<AuditRow> AccelerationRows(const scara::Parameters& p,
       {.equation = "(30)",
        .erratum = "E7",
        .printed = "with all three errors below and misplaced transposes of R_i",
-       .corrected = "Θ_i = (1/V)[−l1 (η·s) C + (η·u)/V² Rᵀηηᵀ R + (l1/L) RᵀPᵀP R], "
-                    "P = E − n ηᵀ/V",
+       .corrected = "Θ_i = (1/V)[−l1 (η·s) C + (η·u)/V² Rᵀηηᵀ R + (l1/L) RᵀPᵀP R], P = E − n ηᵀ/V",
        .limit = limit,
        .unit = unit,
        .note = "effect on θ̈; the transposes of R_i are corrected, else shapes do not fit"});
@@ -395,9 +376,7 @@ std::vector<AuditRow> AccelerationRows(const scara::Parameters& p,
                   .unit = unit,
                   .note = "the other terms corrected"});
   RowMeter forward({.equation = "(29) Ẍ",
-                    .erratum = {},
                     .printed = "Ẍ = J⁻¹ θ̈ − J⁻¹ f(Ẋ)",
-                    .corrected = {},
                     .limit = limit,
                     .unit = "m/s², rad/s²",
                     .note = "with the corrected f"});
@@ -425,7 +404,7 @@ std::vector<AuditRow> AccelerationRows(const scara::Parameters& p,
 
 }  // namespace
 
-std::vector<AuditRow> VelocityRows(const scara::Parameters& parameters,
+std::vector<AuditRow> VelocityRows(const scara_robot::Parameters& parameters,
                                    const std::vector<State>& states) {
   std::vector<AuditRow> rows = JacobianRows(parameters, states);
   for (AuditRow& row : AccelerationRows(parameters, states)) rows.push_back(std::move(row));
@@ -440,8 +419,8 @@ Vec3 Across(const Vec3& v, const Vec3& axis) { return v - axis.dot(v) * axis; }
 struct LimbJacobians {
   Mat34 J_i2, J_omega;
 };
-LimbJacobians JacobiansAt(const scara::Parameters& p, double t_s, int i) {
-  scara::Position at;
+LimbJacobians JacobiansAt(const scara_robot::Parameters& p, double t_s, int i) {
+  scara_robot::Position at;
   const RunSummary reach = InversePosition(p, PathAt(t_s).X, &at);
   LimbJacobians result;
   if (!reach.ok()) {
@@ -449,15 +428,16 @@ LimbJacobians JacobiansAt(const scara::Parameters& p, double t_s, int i) {
     result.J_omega.setConstant(kNan);
     return result;
   }
-  scara::LinkMotion links;
-  FillLinkMotion(p, at, scara::Rates{}, InverseOfJ(p, at), scara::RodModel::kThin, i, &links);
+  scara_robot::LinkMotion links;
+  FillLinkMotion(p, at, scara_robot::Rates{}, InverseOfJ(p, at), scara_robot::RodModel::kThin, i,
+                 &links);
   result.J_i2 = links.J_rod;
   result.J_omega = links.J_omega;
   return result;
 }
 
 /// dJ/dt by sixth-order differences; step for 1e-9 of roundoff and truncation at 6 Hz.
-LimbJacobians RateOfJacobians(const scara::Parameters& p, double t_s, int i) {
+LimbJacobians RateOfJacobians(const scara_robot::Parameters& p, double t_s, int i) {
   constexpr double h = 5e-4;
   LimbJacobians rate{Mat34::Zero(), Mat34::Zero()};
   constexpr double weights[] = {45.0, -9.0, 1.0};
@@ -471,12 +451,11 @@ LimbJacobians RateOfJacobians(const scara::Parameters& p, double t_s, int i) {
   return rate;
 }
 
-std::vector<AuditRow> CentreRows(const scara::Parameters& p, const std::vector<State>& states) {
+std::vector<AuditRow> CentreRows(const scara_robot::Parameters& p,
+                                 const std::vector<State>& states) {
   const double limit = Limit(3.0);
   RowMeter v1({.equation = "(31) v_i1",
-               .erratum = {},
                .printed = "v_i1 = ½ l1 θ̇_i (ν_i u_i)",
-               .corrected = {},
                .limit = limit,
                .unit = "m/s",
                .note = "lost cross; against the middle of the arm"});
@@ -495,9 +474,7 @@ std::vector<AuditRow> CentreRows(const scara::Parameters& p, const std::vector<S
                .unit = "m/s",
                .note = "the tip moves twice as fast as the middle"});
   RowMeter vB({.equation = "(33)",
-               .erratum = {},
                .printed = "v_B = v_D",
-               .corrected = {},
                .limit = limit,
                .unit = "m/s",
                .note = "holds for i = 1, 2; the sentence before it says i = 3, 4"});
@@ -509,9 +486,7 @@ std::vector<AuditRow> CentreRows(const scara::Parameters& p, const std::vector<S
                .unit = "m/s",
                .note = "J⁻¹ has four rows; read as its top three"});
   RowMeter v2({.equation = "(34), (36) v_i2",
-               .erratum = {},
                .printed = "v_i2 = ½ (v_C + v_D)",
-               .corrected = {},
                .limit = limit,
                .unit = "m/s",
                .note = "with the corrected v_C; for two rods the mean of their middles"});
@@ -523,7 +498,7 @@ std::vector<AuditRow> CentreRows(const scara::Parameters& p, const std::vector<S
                .unit = "m/s",
                .note = "v_C is 2 v_i1"});
   for (const State& state : states) {
-    const scara::Position& at = state.position;
+    const scara_robot::Position& at = state.position;
     const Vec4& dtheta = state.rates.dtheta;
     const Vec4 dX = state.J_inverse * dtheta;
     for (int i = 0; i < kLimbs; ++i) {
@@ -546,12 +521,11 @@ std::vector<AuditRow> CentreRows(const scara::Parameters& p, const std::vector<S
           v2.Finish(), J2.Finish(), JB.Finish()};
 }
 
-std::vector<AuditRow> RotationRows(const scara::Parameters& p, const std::vector<State>& states) {
+std::vector<AuditRow> RotationRows(const scara_robot::Parameters& p,
+                                   const std::vector<State>& states) {
   const double limit = Limit(30.0);
   RowMeter across({.equation = "(37)",
-                   .erratum = {},
                    .printed = "ε_i = (1/l2) U_i (J_B − 2 J_i1) θ̇, the part across the rod",
-                   .corrected = {},
                    .limit = limit,
                    .unit = "rad/s",
                    .note = "with (35) corrected; both rods of a limb turn alike"});
@@ -570,12 +544,12 @@ std::vector<AuditRow> RotationRows(const scara::Parameters& p, const std::vector
                   .unit = "rad/s",
                   .note = "limbs 3, 4, the part across the rod"});
   for (const State& state : states) {
-    const scara::Position& at = state.position;
+    const scara_robot::Position& at = state.position;
     for (int i = 0; i < kLimbs; ++i) {
       const LimbTruth& limb = state.limbs[i];
-      scara::LinkMotion thin, full;
-      FillLinkMotion(p, at, state.rates, state.J_inverse, scara::RodModel::kThin, i, &thin);
-      FillLinkMotion(p, at, state.rates, state.J_inverse, scara::RodModel::kFull, i, &full);
+      scara_robot::LinkMotion thin, full;
+      FillLinkMotion(p, at, state.rates, state.J_inverse, scara_robot::RodModel::kThin, i, &thin);
+      FillLinkMotion(p, at, state.rates, state.J_inverse, scara_robot::RodModel::kFull, i, &full);
       const Vec3 truth = Across(limb.omega_rod, limb.R_rod.col(0));
       const Vec3 from_J = thin.J_omega * state.rates.dtheta;
       if (i < 2) AddAll(&across, truth, from_J, from_J);
@@ -587,14 +561,12 @@ std::vector<AuditRow> RotationRows(const scara::Parameters& p, const std::vector
   return {across.Finish(), spin.Finish(), third.Finish()};
 }
 
-std::vector<AuditRow> LinkAccelerationRows(const scara::Parameters& p,
+std::vector<AuditRow> LinkAccelerationRows(const scara_robot::Parameters& p,
                                            const std::vector<State>& states) {
   // Differences of the Jacobians: 1e-9 of their rates.
   const double limit = 1e-7;
   RowMeter eps({.equation = "(39)",
-                .erratum = {},
                 .printed = "ε̇_i = J̇_εi θ̇ + J_εi θ̈",
-                .corrected = {},
                 .limit = 30 * limit,
                 .unit = "rad/s²",
                 .note = "two dots on the left are a misprint; J̇ by differences, without spin"});
@@ -606,9 +578,7 @@ std::vector<AuditRow> LinkAccelerationRows(const scara::Parameters& p,
                   .unit = "rad/s²",
                   .note = "the Jacobian of limbs 1, 2, with 1/l2; J̇ by differences, without spin"});
   RowMeter rods({.equation = "(41)",
-                 .erratum = {},
                  .printed = "v̇_i2 = J̇_i2 θ̇ + J_i2 θ̈",
-                 .corrected = {},
                  .limit = limit,
                  .unit = "m/s²",
                  .note = "with J_i2 corrected, J̇ by differences"});
@@ -636,7 +606,7 @@ std::vector<AuditRow> LinkAccelerationRows(const scara::Parameters& p,
 
 }  // namespace
 
-std::vector<AuditRow> LinkRows(const scara::Parameters& parameters,
+std::vector<AuditRow> LinkRows(const scara_robot::Parameters& parameters,
                                const std::vector<State>& states) {
   std::vector<AuditRow> rows = CentreRows(parameters, states);
   for (AuditRow& row : RotationRows(parameters, states)) rows.push_back(std::move(row));

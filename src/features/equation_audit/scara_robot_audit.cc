@@ -15,7 +15,7 @@ namespace mbv {
 AuditTable AuditScaraRobot(const std::string& models_dir) {
   const LoadResult model = LoadModel(models_dir + "/scara_robot/model.yaml");
   MBV_DEMAND(model.mechanism.has_value(), model.diagnostics.Text());
-  const scara::Parameters parameters = scara::ParametersOf(*model.mechanism);
+  const scara_robot::Parameters parameters = scara_robot::ParametersOf(*model.mechanism);
   const std::vector<scara_audit::State> states = scara_audit::Sweep(*model.mechanism);
   const Mechanism elastic = stiffness_audit::LoadElastic(models_dir, "scara_robot");
   AuditTable table;
@@ -28,7 +28,7 @@ AuditTable AuditScaraRobot(const std::string& models_dir) {
        {scara_audit::PositionRows(*model.mechanism, parameters, states),
         scara_audit::VelocityRows(parameters, states), scara_audit::LinkRows(parameters, states),
         scara_audit::DynamicsRows(parameters, states),
-        scara_audit::StiffnessRows(models_dir, scara::StiffnessParametersOf(elastic))}) {
+        scara_audit::StiffnessRows(models_dir, scara_robot::StiffnessParametersOf(elastic))}) {
     for (AuditRow& row : rows) table.rows.push_back(std::move(row));
   }
   return table;
@@ -94,8 +94,8 @@ class TruthReader {
   TruthReader(const Mechanism& mechanism, const BodyStates& states)
       : mechanism_(mechanism), states_(states) {}
 
-  LimbTruth Limb(int i, const scara::Parameters& p) const {
-    const std::string limb = scara::LimbName(i);
+  LimbTruth Limb(int i, const scara_robot::Parameters& p) const {
+    const std::string limb = scara_robot::LimbName(i);
     const int arm = Body(limb + ".arm");
     const int rod_a = Body(limb + (i < 2 ? ".rod_a" : ".rod"));
     const int rod_b = i < 2 ? Body(limb + ".rod_b") : rod_a;
@@ -155,7 +155,7 @@ PathPoint PathAt(double t_s) {
 }
 
 std::vector<State> Sweep(const Mechanism& mechanism) {
-  const scara::Parameters parameters = scara::ParametersOf(mechanism);
+  const scara_robot::Parameters parameters = scara_robot::ParametersOf(mechanism);
   const Motion motion = SweepMotion(mechanism);
   ReferenceSolver solver(mechanism, motion);
   CommandSample command;
@@ -178,11 +178,12 @@ std::vector<State> Sweep(const Mechanism& mechanism) {
     state.tilt = truth.Tilt();
     state.domega_platform = truth.PlatformAcceleration();
     for (int i = 0; i < kLimbs; ++i) state.limbs[i] = truth.Limb(i, parameters);
-    const RunSummary reach = scara::InversePosition(parameters, command.position, &state.position);
+    const RunSummary reach =
+        scara_robot::InversePosition(parameters, command.position, &state.position);
     MBV_DEMAND(reach.ok(), reach.message);
-    state.J_inverse = scara::InverseOfJ(parameters, state.position);
-    state.J = scara::InverseJacobian(parameters, state.position).cwiseInverse().asDiagonal() *
-              scara::DirectJacobian(state.position);
+    state.J_inverse = scara_robot::InverseOfJ(parameters, state.position);
+    state.J = scara_robot::InverseJacobian(parameters, state.position).cwiseInverse().asDiagonal() *
+              scara_robot::DirectJacobian(state.position);
     states.push_back(state);
   }
   return states;

@@ -8,7 +8,6 @@
 #include "analytic/scara_robot/dynamics.h"
 #include "analytic/scara_robot/stiffness.h"
 #include "features/equation_audit/audit.h"
-#include "features/equation_audit/row_meter.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 
@@ -21,10 +20,10 @@
 
 namespace mbv::scara_audit {
 
-using scara::kLimbs;
-using scara::Mat34;
-using scara::Mat4;
-using scara::Vec4;
+using scara_robot::kLimbs;
+using scara_robot::Mat34;
+using scara_robot::Mat4;
+using scara_robot::Vec4;
 
 /// A point's motion in world axes.
 struct PointMotion {
@@ -45,15 +44,15 @@ struct LimbTruth {
 /// One state: commanded, solved, and the closed form's geometry at it.
 struct State {
   double time_s = 0.0;
-  Vec4 theta;            ///< drive angles of the reference solver
-  scara::Rates rates;    ///< X as commanded, θ as solved by the reference
-  Vec4 M;                ///< drive torques
-  PointMotion P;         ///< platform
-  Vec3 domega_platform;  ///< [rad/s²]
-  double tilt = 0.0;     ///< angle of the platform's z axis from the world's [rad]
+  Vec4 theta;                ///< drive angles of the reference solver
+  scara_robot::Rates rates;  ///< X as commanded, θ as solved by the reference
+  Vec4 M;                    ///< drive torques
+  PointMotion P;             ///< platform
+  Vec3 domega_platform;      ///< [rad/s²]
+  double tilt = 0.0;         ///< angle of the platform's z axis from the world's [rad]
   std::array<LimbTruth, kLimbs> limbs;
-  scara::Position position;  ///< closed form at the commanded pose
-  Mat4 J, J_inverse;         ///< closed form, (28)
+  scara_robot::Position position;  ///< closed form at the commanded pose
+  Mat4 J, J_inverse;               ///< closed form, (28)
 };
 
 /// External load of the sweep.
@@ -82,20 +81,20 @@ inline void AddAll(RowMeter* meter, const VecX& truth, const VecX& printed, cons
 
 /// Topology, Table 1, Eqs. (1)–(10), (22), (23), (49).
 [[nodiscard]] std::vector<AuditRow> PositionRows(const Mechanism& mechanism,
-                                                 const scara::Parameters& parameters,
+                                                 const scara_robot::Parameters& parameters,
                                                  const std::vector<State>& states);
 /// Eqs. (24)–(30).
-[[nodiscard]] std::vector<AuditRow> VelocityRows(const scara::Parameters& parameters,
+[[nodiscard]] std::vector<AuditRow> VelocityRows(const scara_robot::Parameters& parameters,
                                                  const std::vector<State>& states);
 /// Eqs. (31)–(41).
-[[nodiscard]] std::vector<AuditRow> LinkRows(const scara::Parameters& parameters,
+[[nodiscard]] std::vector<AuditRow> LinkRows(const scara_robot::Parameters& parameters,
                                              const std::vector<State>& states);
 /// Eqs. (42)–(48).
-[[nodiscard]] std::vector<AuditRow> DynamicsRows(const scara::Parameters& parameters,
+[[nodiscard]] std::vector<AuditRow> DynamicsRows(const scara_robot::Parameters& parameters,
                                                  const std::vector<State>& states);
 /// Eqs. (11)–(21) and the symmetry of Figs 9–11, on models_dir/scara_robot/elastic.yaml.
-[[nodiscard]] std::vector<AuditRow> StiffnessRows(const std::string& models_dir,
-                                                  const scara::StiffnessParameters& parameters);
+[[nodiscard]] std::vector<AuditRow> StiffnessRows(
+    const std::string& models_dir, const scara_robot::StiffnessParameters& parameters);
 
 }  // namespace mbv::scara_audit
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "analytic/spr_tripod/workspace.h"
-#include "features/equation_audit/row_meter.h"
+#include "features/equation_audit/audit.h"
 #include "features/equation_audit/spr_tripod_audit.h"
 #include "math/profile.h"
 #include "math/spatial.h"
@@ -66,13 +66,14 @@ void GeometryRows(const Case& c, std::vector<AuditRow>* rows) {
                        "with the reference's A_i, B_i and platform; size: q_i");
   RowMeter joints = row("(3)", "B_i = b f_i, A_i = a R f_i + r",
                         "against origins of the reference's cylinders and rods");
-  RowMeter length = row("(4)", "q_i² = |A_i − B_i|²", "lengths q_i against the reference's slides");
-  RowMeter vector = row("(5)", "q_i w_i = A_i − B_i", "against the reference's slide axes");
+  RowMeter length =
+      row("(4)", "q_i² = |A_i − B_i|²", "lengths q_i against the reference's prismatic joints");
+  RowMeter vector = row("(5)", "q_i w_i = A_i − B_i", "against the reference's prismatic axes");
   RowMeter direction({.equation = "(8)",
                       .printed = "w_i = (r + a_i − b_i)/q_i",
                       .limit = kPositionLimit,
                       .unit = "1",
-                      .note = "against the reference's slide axes"});
+                      .note = "against the reference's prismatic axes"});
   RowMeter forward = row("(9)", "q_i² = (r + a_i − b_i)ᵀ(r + a_i − b_i)", "as (4)");
   for (const Truth& t : c.truth) {
     const Mat3 R = PrintedRotation(t.psi, t.theta, t.delta);
@@ -315,7 +316,7 @@ void SlideRows(const Case& c, std::vector<AuditRow>* rows) {
                    .unit = "m/s",
                    .note = "v_Bi is zero; and J v is the vector of all q̇, not one q̇_i"});
   RowMeter matrix = Rate("(14) J", "J = [w_iᵀ] + [(r_i × w_i)ᵀ] J_c", "m/s",
-                         "q̇ = J v against the reference's slides");
+                         "q̇ = J v against the reference's prismatic joints");
   for (size_t n = 0; n < c.truth.size(); ++n) {
     const Truth& t = c.truth[n];
     const Closed& k = c.closed[n];
@@ -419,7 +420,8 @@ std::vector<AuditRow> DynamicsRows(const Case& c) {
       row("(D6)", "ω̇_i = [w_i × a_Ai − 2q̇_i ω_ixy]/q_i + d/dt ω_iz", kAccelerationLimit, "rad/s²");
   RowMeter force = row("(D9)", "f = J⁻ᵀ Σ (VᵀF + WᵀN)", kForceLimit, "N");
   RowMeter reaction =
-      row("(D11)", "S_i from the balances of force, moment and each leg's hinge", kForceLimit, "N");
+      row("(D11)", "S_i from the balances of force, moment and each leg's revolute joint",
+          kForceLimit, "N");
   RowMeter second = row("(D12)", "f_i = (S_i − F_cyl,i)·w_i", kForceLimit, "N");
   for (size_t n = 0; n < c.truth.size(); ++n) {
     const Truth& t = c.truth[n];

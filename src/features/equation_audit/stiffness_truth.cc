@@ -1,7 +1,6 @@
 #include "features/equation_audit/stiffness_truth.h"
 
 #include <algorithm>
-#include <array>
 
 #include "base/demand.h"
 #include "model_file/load_model.h"

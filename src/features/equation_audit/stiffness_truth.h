@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "features/equation_audit/row_meter.h"
+#include "features/equation_audit/audit.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv::stiffness_audit {

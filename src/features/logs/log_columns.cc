@@ -13,7 +13,7 @@
 
 #include "base/text.h"
 #include "mechanism/reach.h"
-#include "scenario/tables/units.h"
+#include "scenario/tables/text.h"
 
 namespace mbv {
 namespace {

@@ -34,7 +34,7 @@ class LogFitter {
 
   LogFit Fit() {
     Compare();
-    // First away from every reversal that a delay could move, so that no sign is in doubt.
+    // First away from every reversal that a delay could move, so that every sign is certain.
     const double step_s =
         force_.end_s / static_cast<double>(std::max<size_t>(force_.log.size(), 1));
     ChooseRows(0.0, most_delay_s_);

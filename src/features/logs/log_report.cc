@@ -302,7 +302,7 @@ std::string Sentence(const LogDrive& drive, const LogTerm& term, double step_s) 
                            text);
       }
       return fmt::format(
-          "gain {}: the log is so many times the model (torque constant, gear, masses)", text);
+          "gain {}: the log is this multiple of the model (torque constant, gear, masses)", text);
     case Kind::kOffset:
       return fmt::format("offset {}: zero of the torque sensor, or a weight or spring", text);
     case Kind::kDelay:

@@ -170,7 +170,7 @@ class LogReader {
         double value = kNan;
         if (read.kind == CellNumber::Kind::kText) {
           words.Add(line.number, number.column,
-                    fmt::format("'{}' in column '{}' is no number", QuotedValue(number.text, 40),
+                    fmt::format("'{}' in column '{}' is not a number", QuotedValue(number.text, 40),
                                 series.column.heading));
         } else if (read.kind == CellNumber::Kind::kNumber) {
           value = series.column.factor * read.value + series.column.shift;

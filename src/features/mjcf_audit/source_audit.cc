@@ -14,12 +14,11 @@
 #include "base/worker_pool.h"
 #include "comparison/comparison.h"
 #include "comparison/verdict.h"
-#include "features/mjcf_audit/source_model_run_bytes.h"
 #include "features/mjcf_audit/source_options.h"
-#include "kinematics/driven_twists.h"
+#include "kinematics/command_rank.h"
 #include "mechanism/reach.h"
 #include "reference/reference.h"
-#include "simulation/mjcf/closure_settings.h"
+#include "simulation/mjcf/foreign.h"
 #include "simulation/mjcf/mjcf.h"
 #include "verify/run_witnesses.h"
 
@@ -121,9 +120,7 @@ SourceModelRun SourceModelRuns::InChild(const SourceModelTask& task) const {
   SourceModelRun failed;
   failed.summary = {
       .stop = Stop::kEngineFailure,
-      .message = fmt::format("MuJoCo crashed on it, or took longer than {:g} s", kTimeout_s),
-      .where = {},
-      .unit = {}};
+      .message = fmt::format("MuJoCo crashed on it, or took longer than {:g} s", kTimeout_s)};
   return failed;
 }
 
@@ -196,8 +193,9 @@ void CloseBands(Trace* run, Trace* truth) {
   }
 }
 
-void SourceModelRuns::MeasureForces(const SourceModelRun& own_run, SourceModelError* error) const {
-  Trace run = own_run.trace, truth = truth_->trace;
+void SourceModelRuns::MeasureForces(const SourceModelRun& audited_run,
+                                    SourceModelError* error) const {
+  Trace run = audited_run.trace, truth = truth_->trace;
   CloseBands(&run, &truth);
   ComparisonInput input = InputOf(prepared_);
   input.motion = &motion_;
@@ -480,7 +478,7 @@ class Search {
 };
 
 // Tries settings until the time is over, recommends one and runs the file with its lines in it.
-// `base`: how every run is led and what it leaves out; `own`: the file's run with that.
+// `base`: how every run is driven and what it leaves out; `own`: the file's run with that.
 void SearchSettings(const SourceModelRequest& request, const SourceModelSettings& base,
                     const SourceModelRuns::Measured& own, SourceModelRuns* runs,
                     SourceModelAudit* audit) {
@@ -520,8 +518,7 @@ const std::vector<CauseRow>& Rows() {
        }},
       {"friction", "soft friction losses (solreffriction, solimpfriction)",
        "In MuJoCo a joint with dry friction is held by a damper that gives way where its force "
-       "exceeds the "
-       "friction loss: near rest it creeps, and the force is less than the loss.",
+       "exceeds the friction loss: near rest it creeps, and the force is less than the loss.",
        [](const SourceModelFacts& facts) { return facts.has_friction; },
        [](const SourceModelFacts&, SourceModelSettings* s) { s->stiff_friction = true; }},
       {"integration", "step and integrator",
@@ -532,11 +529,11 @@ const std::vector<CauseRow>& Rows() {
          s->step_factor = 0.25;
        }},
       {"drives", "drives that lag behind their command",
-       "The file's own servos or equalities lead the drives; they follow with a delay, and their "
+       "The file's own servos or equalities hold the drives; they follow with a delay, and their "
        "forces are those of another motion than the commanded one.",
        [](const SourceModelFacts& facts) {
-         return std::any_of(facts.leads.begin(), facts.leads.end(),
-                            [](DriveLead lead) { return lead != DriveLead::kAdded; });
+         return std::any_of(facts.held_by.begin(), facts.held_by.end(),
+                            [](DriveHold hold) { return hold != DriveHold::kAdded; });
        },
        [](const SourceModelFacts&, SourceModelSettings* s) { s->exact_drives = true; }},
       {"left_out", "what the reference does not have",
@@ -619,16 +616,16 @@ class Auditor {
 
   void ReportActuated(const SourceModelFacts& facts) {
     std::vector<std::string> servos, equalities, motors, bare;
-    for (size_t k = 0; k < facts.leads.size(); ++k) {
+    for (size_t k = 0; k < facts.held_by.size(); ++k) {
       const std::string& name = request_.prepared->base.drives[k].name;
-      switch (facts.leads[k]) {
-        case DriveLead::kServo:
+      switch (facts.held_by[k]) {
+        case DriveHold::kServo:
           servos.push_back(name);
           break;
-        case DriveLead::kEquality:
+        case DriveHold::kEquality:
           equalities.push_back(name);
           break;
-        case DriveLead::kAdded:
+        case DriveHold::kAdded:
           (facts.motors[k].empty() ? bare : motors).push_back(name);
           break;
       }
@@ -637,11 +634,11 @@ class Auditor {
       constexpr size_t kMost = 6;
       if (!names.empty()) audit_.done.push_back(Joined(names, kMost) + ": " + how);
     };
-    say(servos, "led by the file's own position servos, which get the commanded positions");
+    say(servos, "driven by the file's own position servos, which get the commanded positions");
     say(equalities,
-        "led by the file's own equality on the joint, which gets the commanded position");
+        "driven by the file's own equality on the joint, which gets the commanded position");
     const std::string exactly =
-        "an added equality leads the joint, as stiff as MuJoCo allows and with the commanded "
+        "an added equality prescribes the joint, as stiff as MuJoCo allows and with the commanded "
         "acceleration, so that it adds no error of its own";
     say(motors, "motors in the file, which do not know where to go: " + exactly);
     say(bare, "no actuator in the file: " + exactly);

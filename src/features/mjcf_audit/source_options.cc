@@ -7,17 +7,17 @@
 #include <string>
 #include <vector>
 
+#include "base/files.h"
 #include "base/markup.h"
-#include "base/names.h"
 #include "mechanism/channels.h"
 #include "simulation/engine/engine_model.h"
 #include "simulation/engine/session.h"
 #include "simulation/import/mjcf_import.h"
 #include "simulation/import/read_mjcf.h"
-#include "simulation/mjcf/closure_settings.h"
+#include "simulation/mjcf/foreign.h"
 #include "simulation/mjcf/mjcf.h"
 
-// A user's compiled MJCF, made ready to be led along a motion. Internal to simulation/.
+// A user's compiled MJCF, made ready to follow a motion. Internal to simulation/.
 
 namespace mbv::simulation {
 
@@ -27,10 +27,10 @@ struct OwnDrive {
   int qpos = -1;   ///< address
   int dof = -1;
   double zero = 0.0;  ///< joint position where the drive's position is 0
-  DriveLead lead = DriveLead::kAdded;
+  DriveHold hold = DriveHold::kAdded;
   int equality = -1;           ///< of the file; -1: none
-  int added = -1;              ///< equality that was added, off unless it leads
-  std::vector<int> actuators;  ///< that lead it
+  int added = -1;              ///< equality that was added, off unless it holds the drive
+  std::vector<int> actuators;  ///< that move it
 };
 
 struct OwnClosure {
@@ -52,7 +52,7 @@ struct SourceModel {
 
 /// The file's own step, integrator, solver and settings of closures, as facts.
 void ReportSettings(SourceModel* own);
-/// Finds what leads each drive; switches off what the mechanism does not have and what would push
+/// Finds what holds each drive; switches off what the mechanism does not have and what would push
 /// against the commanded motion.
 void FindLeads(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own);
 /// Holds free bodies and changes what the task's settings say.
@@ -108,7 +108,7 @@ class OwnStepper {
 namespace {
 
 RunSummary Unsupported(const std::string& why) {
-  return {.stop = Stop::kUnsupported, .message = why, .where = {}, .unit = {}};
+  return {.stop = Stop::kUnsupported, .message = why};
 }
 
 std::string AddedName(size_t drive) { return fmt::format("mbverify:drive:{}", drive); }
@@ -188,7 +188,7 @@ class SourceModelMaker {
     const mjModel& with = *own_.m;
     const int added = static_cast<int>(own_.drives.size());
     if (with.nq != m.nq || with.nbody != m.nbody || with.neq != m.neq + added) {
-      return Unsupported("its drives cannot be led by added equalities");
+      return Unsupported("its drives cannot be held by added equalities");
     }
     for (size_t k = 0; k < own_.drives.size(); ++k) {
       own_.drives[k].added = IdOf(with, mjOBJ_EQUALITY, AddedName(k));
@@ -249,7 +249,7 @@ class SourceModelMaker {
 
 }  // namespace
 
-// Compiles the file with an equality for each drive, finds what leads the drives and applies the
+// Compiles the file with an equality for each drive, finds what holds the drives and applies the
 // settings. kUnsupported with the reason where that cannot be; throws EngineError.
 RunSummary MakeSourceModel(const SourceModelTask& task, SourceModel* own) {
   return SourceModelMaker(task, own).Make();
@@ -413,7 +413,7 @@ void TakeSettings(const SourceModelTask& task, const ImportedMjcf& imported, Sou
   SettingsTaker(task, imported, own).Run();
 }
 
-// What leads the drives of a user's model, and what is switched off.
+// What holds the drives of a user's model, and what is switched off.
 
 namespace {
 
@@ -492,15 +492,15 @@ class LeadFinder {
           drive.equality = e;
         }
       }
-      drive.lead = drive.equality >= 0 ? DriveLead::kEquality
-                   : servo             ? DriveLead::kServo
-                                       : DriveLead::kAdded;
-      own_.facts.leads.push_back(drive.lead);
+      drive.hold = drive.equality >= 0 ? DriveHold::kEquality
+                   : servo             ? DriveHold::kServo
+                                       : DriveHold::kAdded;
+      own_.facts.held_by.push_back(drive.hold);
       own_.facts.motors.push_back(motor);
-      if (task_.settings.exact_drives) drive.lead = DriveLead::kAdded;
-      if (drive.lead != DriveLead::kServo) drive.actuators.clear();
-      if (drive.lead != DriveLead::kEquality) drive.equality = -1;
-      if (drive.lead == DriveLead::kAdded) m_->eq_active[drive.added] = 1;
+      if (task_.settings.exact_drives) drive.hold = DriveHold::kAdded;
+      if (drive.hold != DriveHold::kServo) drive.actuators.clear();
+      if (drive.hold != DriveHold::kEquality) drive.equality = -1;
+      if (drive.hold == DriveHold::kAdded) m_->eq_active[drive.added] = 1;
     }
   }
 
@@ -521,10 +521,11 @@ class LeadFinder {
     m_->opt.disableflags |= mjDSBL_CONTACT;
     if (task_.ignore_ranges) m_->opt.disableflags |= mjDSBL_LIMIT;
     for (int e = 0; e < static_cast<int>(imported_->closure_of.size()); ++e) {
-      const bool leads = std::any_of(own_.drives.begin(), own_.drives.end(),
-                                     [&](const OwnDrive& drive) { return drive.equality == e; });
+      const bool holds_drive =
+          std::any_of(own_.drives.begin(), own_.drives.end(),
+                      [&](const OwnDrive& drive) { return drive.equality == e; });
       const std::string name = NameAt(*m_, mjOBJ_EQUALITY, e, "equality");
-      if (m_->eq_active[e] == 0 || leads || IsLoop(*m_, e) || IsCoupling(name)) continue;
+      if (m_->eq_active[e] == 0 || holds_drive || IsLoop(*m_, e) || IsCoupling(name)) continue;
       m_->eq_active[e] = 0;
       if (!HoldsOneJoint(*m_, e) || !task_.settings.exact_drives)
         own_.facts.couplings.push_back(name);
@@ -560,9 +561,7 @@ thread_local OwnStepper* stepping = nullptr;
 RunSummary Unsound(const std::string& what, double t_s) {
   return {.stop = Stop::kEngineFailure,
           .message = fmt::format("{} at {:.4g} s", what, t_s),
-          .time_s = t_s,
-          .where = {},
-          .unit = {}};
+          .time_s = t_s};
 }
 
 }  // namespace
@@ -648,7 +647,7 @@ void OwnStepper::LeadExactly() {
   if (staged_ && !task_.driven(d_->time, &at_.now).ok()) return;
   for (size_t k = 0; k < own_.drives.size(); ++k) {
     const OwnDrive& drive = own_.drives[k];
-    if (drive.lead != DriveLead::kAdded) continue;
+    if (drive.hold != DriveHold::kAdded) continue;
     const double q = d_->qpos[drive.qpos] - drive.zero, v = d_->qvel[drive.dof];
     const int row = row_[static_cast<size_t>(drive.added)];
     if (row < 0) continue;
@@ -665,9 +664,9 @@ RunSummary OwnStepper::Command(long n) {
   for (size_t k = 0; k < own_.drives.size(); ++k) {
     const OwnDrive& drive = own_.drives[k];
     const double position = at_.now.position[static_cast<Eigen::Index>(k)];
-    if (drive.lead == DriveLead::kServo) {
+    if (drive.hold == DriveHold::kServo) {
       LeadByActuators(drive, drive.zero + position, at_.now.velocity[static_cast<Eigen::Index>(k)]);
-    } else if (drive.lead == DriveLead::kEquality) {
+    } else if (drive.hold == DriveHold::kEquality) {
       own_.m->eq_data[mjNEQDATA * drive.equality] = position;
     }
   }
@@ -701,10 +700,7 @@ RunSummary OwnStepper::Start() {
                                  first.position[static_cast<Eigen::Index>(k)]));
   }
   if (off > kNear) {
-    return {.stop = Stop::kUnsupported,
-            .message = "the motion does not start at home and at rest",
-            .where = {},
-            .unit = {}};
+    return {.stop = Stop::kUnsupported, .message = "the motion does not start at home and at rest"};
   }
   mj_resetData(m_, d_.get());
   Eigen::Map<VecX>(d_->qpos, m_->nq) = own_.home;
@@ -852,7 +848,7 @@ void OwnStepper::RecordForces(long sample) {
     const OwnDrive& drive = own_.drives[k];
     double force = 0.0;
     for (const int u : drive.actuators) force += m_->actuator_gear[6 * u] * d_->actuator_force[u];
-    const int e = drive.lead == DriveLead::kAdded ? drive.added : drive.equality;
+    const int e = drive.hold == DriveHold::kAdded ? drive.added : drive.equality;
     if (e >= 0 && row_[static_cast<size_t>(e)] >= 0) {
       force = d_->efc_force[row_[static_cast<size_t>(e)]];
     }
@@ -898,10 +894,7 @@ SourceModelRun RunSourceModel(const SourceModelTask& task) {
     simulation::OwnStepper stepper(task, own, &run);
     run.summary = stepper.Run();
   } catch (const simulation::EngineError& error) {
-    run.summary = {.stop = Stop::kEngineFailure,
-                   .message = std::string("MuJoCo: ") + error.what(),
-                   .where = {},
-                   .unit = {}};
+    run.summary = {.stop = Stop::kEngineFailure, .message = std::string("MuJoCo: ") + error.what()};
   }
   return run;
 }

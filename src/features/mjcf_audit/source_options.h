@@ -16,8 +16,8 @@
 
 namespace mbv {
 
-/// What leads a drive along the commanded motion.
-enum class DriveLead {
+/// What makes a drive follow the commanded motion.
+enum class DriveHold {
   kServo,     ///< the file's position actuators on the joint get the commanded position (its
               ///< velocity actuators there the commanded velocity)
   kEquality,  ///< the file's equality that holds the joint gets the commanded position
@@ -36,7 +36,7 @@ struct SourceModelSettings {
   /// Supplies J̇q̇, which MuJoCo before 3.7 leaves out of the closures' reference acceleration, as a
   /// central difference of J q̇ along the motion.
   bool velocity_term = false;
-  bool exact_drives = false;  ///< all drives as DriveLead::kAdded
+  bool exact_drives = false;  ///< all drives as DriveHold::kAdded
   bool plain = false;  ///< without what the mechanism does not have: SourceModelFacts::left_out
   bool exact_solver = false;    ///< Newton's method to the end
   bool stiff_friction = false;  ///< friction losses as stiff as MuJoCo allows: 2 steps, 0.9999
@@ -63,7 +63,7 @@ struct SourceModelFacts {
   bool rough_solver = false;          ///< not Newton's method with at least MuJoCo's default effort
   std::vector<std::string> closures;  ///< names
   std::vector<std::string> solref, solimp;  ///< per closure, as MJCF
-  std::vector<DriveLead> leads;             ///< per drive
+  std::vector<DriveHold> held_by;           ///< per drive
   std::vector<std::string> motors;          ///< per drive: its motor in the file, or ""
   std::vector<std::string> left_out;        ///< "armature", "damping", …
   std::vector<std::string> held;            ///< free bodies that do not move

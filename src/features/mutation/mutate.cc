@@ -16,7 +16,6 @@
 #include "comparison/force_band.h"
 #include "features/mutation/mutation_bench.h"
 #include "features/mutation/mutation_report.h"
-#include "mechanism/channels.h"
 #include "mechanism/motion.h"
 #include "model_file/element_text.h"
 #include "model_file/load_model.h"
@@ -24,7 +23,6 @@
 #include "model_file/yaml/units.h"
 #include "reference/reference.h"
 #include "verify/drive_by.h"
-#include "verify/structural_faults.h"
 
 namespace mbv {
 namespace {
@@ -397,16 +395,6 @@ std::string Bound(double change) {
   return change == 0.0 ? "at all" : fmt::format("by more than {:.0e} of the RMS force", change);
 }
 
-// "a, b, c and 4 more".
-std::string Listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (size_t i = 0; i < std::min<size_t>(names.size(), 3); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  if (names.size() > 3) text += fmt::format(" and {} more", names.size() - 3);
-  return text;
-}
-
 // Names of the items for which `differ` holds.
 template <typename T, typename F>
 std::vector<std::string> Which(const std::vector<T>& a, const std::vector<T>& b, F differ) {
@@ -585,8 +573,7 @@ std::string WhySwapUnseen(const MutationBench& bench, const std::string& a, cons
     worst = std::max(worst, change == 0.0 ? 0.0 : change / largest);
   }
   return fmt::format(
-      "in this motion {} and {} do the same: their positions and forces differ by "
-      "{:.0e} at most",
+      "in this motion {} and {} do the same: their positions and forces differ by {:.0e} at most",
       a, b, worst);
 }
 
@@ -594,7 +581,7 @@ std::string WhySwapUnseen(const MutationBench& bench, const std::string& a, cons
 std::string DescribeChange(const Mechanism& base, const Mechanism& perturbed) {
   std::vector<std::string> parts;
   const auto add = [&](const std::string& what, const std::vector<std::string>& names) {
-    if (!names.empty()) parts.push_back(what + " " + Listed(names));
+    if (!names.empty()) parts.push_back(what + " " + JoinedAndMore(names));
   };
   if (base.bodies.size() != perturbed.bodies.size() ||
       base.joints.size() != perturbed.joints.size()) {
@@ -784,8 +771,7 @@ class Mutator {
     const std::optional<Tried> exact = FirstThatMoves(fault);
     if (!exact) {
       result.reason = fmt::format(
-          "the simulation brings all of {} random starts to the same "
-          "assembly, or to none",
+          "the simulation brings all of {} random starts to the same assembly, or to none",
           fault.wrong.size());
       return result;
     }

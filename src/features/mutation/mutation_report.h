@@ -7,8 +7,28 @@
 
 #include "base/diagnostics.h"
 #include "base/types.h"
+#include "mechanism/mechanism.h"
 
 namespace mbv {
+
+// Structural faults: models of the simulated side with one thing wrong that is not a number.
+
+/// One fault put into a copy of the model, or why the mechanism cannot have it.
+struct StructuralFault {
+  std::string kind;        ///< "swapped drives", "flipped axis", …
+  std::string where = {};  ///< "limb1.drive and limb1.drive_p"; "" if not applicable
+  /// Empty if not applicable. Of an assembly several candidates: the first that moves differently
+  /// is the fault, the others are the same assembly after all.
+  std::vector<Mechanism> wrong = {};
+  std::string not_applicable = {};      ///< the reason, where there is no `wrong`
+  std::string first = {}, second = {};  ///< the drives of a swap
+  size_t alike = 0;  ///< further places that are the same by symmetry of parts, left out
+};
+
+/// Every fault of the list that applies, one per place (equal parts once), the others with reasons:
+/// swapped drives, flipped axis of a drive, exchanged universal-joint axes, sign of products of
+/// inertia, wrong assembly (elbow branch), missing closure, 9.80665 for 9.81.
+[[nodiscard]] std::vector<StructuralFault> StructuralFaults(const Mechanism& mechanism);
 
 /// What one way of running the scenario (its own mode, or inverse dynamics) shows of a number that
 /// is wrong, larger and smaller by the same relative error. Where both ways run, the one that shows
@@ -54,7 +74,7 @@ struct FaultDetection {
   std::string reason;                 ///< could not run, or why not detected
 };
 
-/// One structural fault (structural_faults.h).
+/// One structural fault.
 struct FaultResult {
   std::string kind, where;
   bool applicable = false;  ///< false: `reason` says why the mechanism cannot have it
@@ -71,7 +91,7 @@ struct MutationReport {
   std::string mode;  ///< of the scenario, "forward" or "inverse"
   double size = kNan, resolution = kNan;
   std::vector<Mutation> mutations;  ///< most sensitive first
-  std::vector<FaultResult> faults;  ///< in the order of structural_faults.h
+  std::vector<FaultResult> faults;  ///< in the order of StructuralFaults()
   long runs = 0;                    ///< simulations
   double wall_s = 0.0;
 };

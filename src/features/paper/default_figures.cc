@@ -1,4 +1,4 @@
-#include "features/paper/default_figures.h"
+#include "features/paper/figures.h"
 
 #include <fmt/format.h>
 

@@ -6,9 +6,12 @@
 #include <vector>
 
 #include "base/diagnostics.h"
+#include "features/convergence/order.h"
 #include "features/paper/signals.h"
+#include "math/plot.h"
 #include "plot/figure.h"
 #include "plot/style.h"
+#include "report/report.h"
 #include "verify/run_options.h"
 
 namespace mbv {
@@ -55,5 +58,53 @@ struct FigureOutcome {
 /// `ran`: the result of a run with these options; null: it is run.
 [[nodiscard]] FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
                                         const RunOutcome* ran = nullptr);
+
+// The figures that a paper usually shows of a motion.
+//
+//   drive_forces, drive_torques   lines of one witness, markers of the others; below, the largest
+//                                 difference of all drives, for each pair of witnesses, in
+//                                 120 spans of time
+//   drive_strokes, drive_angles   positions, and rates below
+//   reactions                     magnitudes of joint forces and moments, the largest ones
+//   power_energy                  power of each drive; energies
+//   force_speed, torque_speed     force over speed
+//
+// Drives are parted by unit, and where there are more than kMostCurves into several figures.
+
+inline constexpr size_t kMostCurves = 8;  ///< of one panel, each with its own dashes and colour
+
+struct FigureSet {
+  std::vector<Figure> figures;
+  std::vector<std::string> left_out;  ///< sentences: what is not shown, and why
+};
+[[nodiscard]] FigureSet DefaultFigures(const Report& report, Language language);
+
+// The figures that a scenario composes, of what its run gave.
+
+/// `specs` passed CheckFigures(). Over time a panel of several signals has a colour and dashes for
+/// each, one witness as lines and the others as markers; a panel of one signal, or of differences,
+/// or over another signal has a line for each witness. What no witness recorded is left out, and
+/// reported.
+[[nodiscard]] FigureSet ComposeFigures(const std::vector<FigureSpec>& specs, const Report& report,
+                                       Language language);
+
+// Plots that other parts of the program describe (math/plot.h) as figures: maps, sections.
+
+[[nodiscard]] Figure FromPlot(const std::string& name, const LinePlot& plot);
+/// Both axes have one scale where they have one unit.
+[[nodiscard]] Figure FromPlot(const std::string& name, const MapPlot& plot);
+
+/// Sections of workspaces (analytic/workspace_form.h): what they say in words, in a language.
+[[nodiscard]] Figure FromSection(const std::string& name, const LinePlot& plot, Language language);
+
+/// "x [mm]" → "*x* (mm)", "k_min [N/m]" → "*k*_{min} (N/m)"; words as they are.
+[[nodiscard]] std::string FigureLabel(const std::string& label);
+
+// Errors of drive forces against what a simulation is refined by, in logarithmic axes, with lines
+// of the slopes that were fitted; the legend names them beside those that the schemes promise.
+
+/// "convergence_step" (step, with the time constant or alone) and "convergence_time_constant";
+/// series without two errors above zero are left out, with the reason.
+[[nodiscard]] FigureSet ConvergenceFigures(const ConvergenceReport& report, Language language);
 
 }  // namespace mbv

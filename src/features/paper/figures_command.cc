@@ -1,18 +1,17 @@
 // `mbverify figures --paper`.
 
 #include <fmt/format.h>
-#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "cli/trust.h"
 #include "features/paper/figures.h"
 #include "features/paper/paper_figures.h"
 #include "features/paper/signals.h"
@@ -34,15 +33,13 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kListPapers = "list";
 constexpr const char* kAllPapers = "all";
 
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-
 Json StatementJson(const StatedResult& said) {
   return {{"says", said.says},
           {"where", said.where},
-          {"printed", NumberOrNull(said.printed)},
-          {"smallest", NumberOrNull(said.low)},
-          {"computed", NumberOrNull(said.measured)},
-          {"deviation", NumberOrNull(said.deviation())},
+          {"printed", Number(said.printed)},
+          {"smallest", Number(said.low)},
+          {"computed", Number(said.measured)},
+          {"deviation", Number(said.deviation())},
           {"unit", said.unit}};
 }
 

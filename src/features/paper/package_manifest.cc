@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <iterator>
 
+#include "base/files.h"
 #include "base/json_document.h"
 #include "base/json_text.h"
 #include "base/markup.h"
-#include "base/names.h"
 #include "base/text.h"
 
 namespace mbv {

@@ -46,8 +46,8 @@ struct PackedTruth {
 };
 
 /// Runs a scenario (`file` relative to the folder) in a process of its own, which alone changes its
-/// current folder; what it read must lie below. With `truth` its results are judged
-/// (rerun_judge.h).
+/// current folder; what it read must lie below. With `truth` its results are judged by
+/// JudgeReruns().
 [[nodiscard]] PackedRun RunPacked(const std::string& file, const PackedRunOptions& options,
                                   const PackedTruth* truth = nullptr);
 
@@ -74,5 +74,18 @@ void VisitMembers(Visit& visit, typename Visit::template Of<PackedRun>& run) {
   visit(run.scenario), visit(run.findings), visit(run.files), visit(run.failure);
   visit(run.programs), visit(run.refused);
 }
+
+// The result files of a packed scenario against those of its repetition.
+
+/// Path in the archive → content.
+using PackedResults = std::map<std::string, std::string>;
+
+/// One outcome per file of either side, by path. Traces of motions, stiffnesses and points of
+/// studies are judged by RerunLimits() of the scenario; summaries by their checks; what is made of
+/// those must be the same where they are. `same_versions`: of the program and its libraries. The
+/// scenario is loaded as packed, relative to the current folder.
+[[nodiscard]] std::vector<RerunFile> JudgeReruns(const PackedScenario& scenario,
+                                                 const PackedResults& packed,
+                                                 const PackedResults& rerun, bool same_versions);
 
 }  // namespace mbv

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "base/names.h"
-#include "scenario/snapshots_reader.h"
+#include "base/files.h"
+#include "scenario/section_readers.h"
 
 namespace mbv {
 namespace {
@@ -189,7 +189,7 @@ std::vector<PrintedNumbers> PaperParts::Printed(const YamlMap& map) {
 }
 
 PrintedNumbers PaperParts::PrintedOf(const YamlEntry& at, const std::string& path) {
-  PrintedNumbers numbers{.name = at.key, .from = {}, .at = {}, .unit = {}, .signals = {}};
+  PrintedNumbers numbers{.name = at.key, .from = {}, .unit = {}};
   const YamlMap map(&yaml_, at.value.get(), path, {"from", "at", "unit", "signals"});
   if (!map.valid()) return numbers;
   numbers.from = RequiredWords(map, "from");

@@ -22,11 +22,11 @@ struct BesideRun {
 
 /// Printed numbers of some signals, as a witness of their own.
 struct PrintedNumbers {
-  std::string name;        ///< what they are called: "theory as printed"
-  std::string from;        ///< where they are printed: "Table 2"
-  std::vector<double> at;  ///< times [s], or numbers of the loads
-  PlacedText unit;         ///< of all values
-  std::vector<std::pair<PlacedText, std::vector<double>>> signals;
+  std::string name;             ///< what they are called: "theory as printed"
+  std::string from;             ///< where they are printed: "Table 2"
+  std::vector<double> at = {};  ///< times [s], or numbers of the loads
+  PlacedText unit;              ///< of all values
+  std::vector<std::pair<PlacedText, std::vector<double>>> signals = {};
 };
 
 /// How a statement is measured.

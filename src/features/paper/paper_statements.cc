@@ -1,4 +1,4 @@
-#include "features/paper/paper_statements.h"
+#include "features/paper/paper_figures.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "comparison/metrics.h"
-#include "plot/check_figures.h"
+#include "plot/figure.h"
 #include "plot/style.h"
 
 namespace mbv {

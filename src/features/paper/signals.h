@@ -72,7 +72,7 @@ inline constexpr size_t kMarksAlong = 11;
 
 /// Times in the x unit and values in the y unit.
 [[nodiscard]] FigurePoints Scaled(const PlotPoints& points, const ShownUnit& x, const ShownUnit& y);
-/// The largest value of each of so many spans, at its time.
+/// The largest value of each of this many spans, at its time.
 [[nodiscard]] PlotPoints Envelope(const PlotPoints& points, size_t spans);
 /// Some of the points, spread evenly; `shift` (0 … 1) of a spacing later than the first.
 [[nodiscard]] FigurePoints SomeOf(const FigurePoints& points, double shift);

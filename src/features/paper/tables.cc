@@ -10,12 +10,10 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "cli/trust.h"
 #include "features/run/run_scenario.h"
 #include "kinematics/mobility.h"
 #include "model_file/yaml/yaml_reader.h"
 #include "verify/check_file.h"
-#include "verify/prepare.h"
 
 namespace mbv {
 namespace {

@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,7 +24,6 @@
 #include "cli/cli.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "cli/trust.h"
 #include "features/paper/package.h"
 #include "features/paper/packed_run.h"
 #include "features/paper/rerun_report.h"

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -19,7 +18,6 @@
 #include "cli/files.h"
 #include "cli/terminal.h"
 #include "features/pictures/video.h"
-#include "features/run/run_scenario.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
 #include "verify/pictures.h"

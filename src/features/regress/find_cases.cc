@@ -8,7 +8,6 @@
 
 #include "base/files.h"
 #include "base/json_text.h"
-#include "base/names.h"
 #include "base/text.h"
 #include "base/worker_pool.h"
 #include "features/stiffness/stiffness_scenario.h"

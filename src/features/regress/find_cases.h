@@ -25,7 +25,7 @@ struct FoundCases {
 };
 
 /// The path below the last folder named "scenarios", without ending; for a file elsewhere its path
-/// below the current folder. The same on every machine, and a plain path (base/names.h).
+/// below the current folder. The same on every machine, and a plain path (base/files.h).
 [[nodiscard]] std::string CaseKey(const std::string& file);
 
 /// Files as given; a folder stands for every scenario below it, must_fail ones included. A file

@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <set>
 #include <thread>
 
 #include "base/files.h"
@@ -243,10 +242,9 @@ class Appender {
   std::vector<PastValue> Past(long scenario, long since, const std::string& metric) {
     // Newest first.
     Statement select(db_,
-                     "SELECT r.run, m.value, r.status = 'as_expected' AND m.pass, "
-                     "m.drifted AND r.run > ?2 FROM result r JOIN metric m ON m.result = r.id "
-                     "WHERE r.scenario = ?1 AND r.run >= ?2 AND m.name = ?3 "
-                     "ORDER BY r.run DESC LIMIT ?4");
+                     "SELECT r.run, m.value, r.status = 'as_expected' AND m.pass, m.drifted AND "
+                     "r.run > ?2 FROM result r JOIN metric m ON m.result = r.id WHERE r.scenario = "
+                     "?1 AND r.run >= ?2 AND m.name = ?3 ORDER BY r.run DESC LIMIT ?4");
     select.Bind(scenario, since, metric, kPastRuns);
     std::vector<PastValue> past;
     while (select.Step()) {

@@ -10,14 +10,13 @@
 #include <utility>
 #include <vector>
 
-#include "base/demand.h"
 #include "base/json_text.h"
 #include "base/markup.h"
 #include "base/png.h"
 #include "base/sha256.h"
-#include "features/regress/index_assets.h"
 #include "features/regress/summaries.h"
 #include "features/regress/trouble_text.h"
+#include "report/page.h"
 
 namespace mbv {
 namespace {
@@ -176,22 +175,6 @@ std::string Head(const RegressReport& report) {
   return text;
 }
 
-// The skeleton with its places filled.
-std::string Filled(std::string_view skeleton,
-                   const std::map<std::string_view, std::string_view>& values) {
-  std::string page;
-  for (size_t at = 0; at < skeleton.size();) {
-    const size_t begin = std::min(skeleton.find("{{", at), skeleton.size());
-    page += skeleton.substr(at, begin - at);
-    if (begin == skeleton.size()) break;
-    const size_t end = skeleton.find("}}", begin);
-    MBV_DEMAND(end != std::string_view::npos, begin);
-    page += values.at(skeleton.substr(begin + 2, end - begin - 2));
-    at = end + 2;
-  }
-  return page;
-}
-
 }  // namespace
 
 std::string ToIndexHtml(const RegressReport& report,
@@ -202,14 +185,14 @@ std::string ToIndexHtml(const RegressReport& report,
   const std::string title =
       fmt::format("mbverify regression {}: {}", EscapeMarkup(report.run.started_utc),
                   ExitCodeOf(report) == 0 ? "all as expected" : "not as expected");
-  return Filled(IndexPage(), {{"style_hash", CspHash(IndexStyle())},
-                              {"script_hash", CspHash(IndexScript())},
-                              {"title", title},
-                              {"style", IndexStyle()},
-                              {"head", Head(report)},
-                              {"boxes", Boxes(report, cases)},
-                              {"data", std::move(table).Write(pictures)},
-                              {"script", IndexScript()}});
+  return FillPage(IndexPage(), {{"style_hash", CspHash(IndexStyle())},
+                                {"script_hash", CspHash(IndexScript())},
+                                {"title", title},
+                                {"style", IndexStyle()},
+                                {"head", Head(report)},
+                                {"boxes", Boxes(report, cases)},
+                                {"data", std::move(table).Write(pictures)},
+                                {"script", IndexScript()}});
 }
 
 // Thumbnails: PNG → smaller PNG → data URI.

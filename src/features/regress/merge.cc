@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "base/files.h"
-#include "base/names.h"
 #include "base/output_folder.h"
 #include "features/regress/case_result.h"
 #include "features/regress/find_cases.h"

@@ -15,14 +15,13 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "cli/trust.h"
 #include "features/regress/case_result.h"
 #include "features/regress/history.h"
 #include "features/regress/regress.h"
 #include "features/regress/summaries.h"
 #include "features/regress/trouble_text.h"
-#include "report/html_assets.h"
 #include "report/html_report.h"
+#include "report/page.h"
 #include "verify/version.h"
 
 namespace mbv {
@@ -268,8 +267,7 @@ void AddMergeCommand(CLI::App* app, int* exit_code) {
                   "join what there is: not all shards, or of different runs");
   SetFooter(merge, {"merge shard1 shard2 --out merged --history nightly.sqlite"},
             "0 all as expected, 1 some not, 2 bad input (also: shards of different regression "
-            "runs), 3 some "
-            "could not run, or a shard is missing");
+            "runs), 3 some could not run, or a shard is missing");
   merge->callback([arguments, exit_code] { *exit_code = RunMerge(arguments.get()); });
 }
 

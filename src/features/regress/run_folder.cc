@@ -15,9 +15,7 @@
 
 #include "base/demand.h"
 #include "base/files.h"
-#include "base/names.h"
 #include "base/output_folder.h"
-#include "base/state_folder.h"
 #include "base/types.h"
 #include "base/worker_pool.h"
 #include "features/regress/accuracy.h"
@@ -283,8 +281,7 @@ std::string FindTaken(const RegressOptions& options, const std::vector<std::stri
       if (const std::string part = key.substr(0, end); taken.contains(part)) {
         trouble += fmt::format(
             "{}{}: error: its results would lie at {}, where the regression run writes a file of "
-            "its own; "
-            "rename the scenario or its folder",
+            "its own; rename the scenario or its folder",
             trouble.empty() ? "" : "\n", key, part);
       }
       if (end == std::string::npos) break;

@@ -46,4 +46,11 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// is not a PNG.
 [[nodiscard]] std::string ThumbnailUri(const std::string& png, int width_px);
 
+// The page index.html of a regression, from web/src/regression: page.html with {{places}} to fill,
+// script and style, bundled when the program is built.
+
+[[nodiscard]] std::string_view IndexPage();
+[[nodiscard]] std::string_view IndexScript();
+[[nodiscard]] std::string_view IndexStyle();
+
 }  // namespace mbv

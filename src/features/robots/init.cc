@@ -12,7 +12,6 @@
 
 #include "analytic/closed_form.h"
 #include "base/files.h"
-#include "base/names.h"
 #include "base/text.h"
 #include "cli/cli.h"
 #include "cli/options.h"

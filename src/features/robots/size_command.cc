@@ -10,7 +10,6 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "cli/trust.h"
 #include "features/run/run_scenario.h"
 #include "report/sizing.h"
 

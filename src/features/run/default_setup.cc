@@ -117,13 +117,13 @@ std::vector<ModelCaveat> HoldUnevenSpins(size_t free, Mechanism* m) {
               is_bare(spin.balls[0]) || !is_bare(spin.balls[1]) ? spin.balls[0] : spin.balls[1], m);
     names.push_back(spin.name);
   }
-  return {
-      {.kind = ModelCaveat::Kind::kLeftOut,
-       .text = fmt::format("the free spin of {} about the line{} between {} balls is left out: one "
-                           "ball of each, a universal joint here, bears the moment about the line",
-                           Joined(names, kMostNames), names.size() == 1 ? "" : "s",
-                           names.size() == 1 ? "its" : "their"),
-       .source = "ball"}};
+  return {{.kind = ModelCaveat::Kind::kLeftOut,
+           .text = fmt::format(
+               "the free spin of {} about the line{} between {} spherical joints is left out: "
+               "one of each, a universal joint here, bears the moment about the line",
+               Joined(names, kMostNames), names.size() == 1 ? "" : "s",
+               names.size() == 1 ? "its" : "their"),
+           .source = "ball"}};
 }
 
 // The mechanism with balls held where no drive holds them: for a look at where the drives lead.
@@ -178,7 +178,7 @@ std::string ByForcesNote(const Mechanism& m, const std::vector<Coordinate>& turn
     spins.push_back(fmt::format("{} ({})", spin.name, spin.why_not));
   }
   if (!spins.empty()) {
-    text += "; these spins between two balls are not idle: " + Joined(spins, kMostNames);
+    text += "; these spins between two spherical joints are not idle: " + Joined(spins, kMostNames);
   }
   return text;
 }
@@ -434,7 +434,7 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
 Mechanism WithDriveForEachDof(const Mechanism& mechanism, std::vector<std::string>* notes,
                               std::vector<Coordinate>* by_forces) {
   Mechanism m = mechanism;
-  // Here nobody gives their motion: drives hold them like the others.
+  // Here nothing gives their motion: drives hold them like the others.
   m.prescribed.clear();
   const std::vector<Coordinate> candidates = Candidates(m);
   const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
@@ -527,8 +527,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
     result.diagnostics.Add({Severity::kError, file, 0, 0,
                             "the mechanism has no degree of freedom: there is nothing to move",
                             "`mbverify model` says what holds it; loops that only rounded numbers "
-                            "keep from moving take "
-                            "--closure-tolerance METRES"});
+                            "keep from moving take --closure-tolerance METRES"});
     return result;
   }
   // Added drives hold what the robot's own ones leave free; without own ones all move.

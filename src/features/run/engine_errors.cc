@@ -5,7 +5,6 @@
 
 #include "comparison/verdict.h"
 #include "verify/run_witnesses.h"
-#include "verify/simulate_scenario.h"
 
 namespace mbv {
 namespace {
@@ -51,7 +50,7 @@ EngineError EngineErrorOf(const ComparisonInput& input, const Trace& trace, cons
 FrictionError FrictionErrorOf(const ComparisonInput& input, const Trace& trace,
                               const Trace& truth) {
   const PairComparison pair = ComparePair(input, trace, truth);
-  FrictionError error{.check = {}, .unit = {}};
+  FrictionError error{.check = {}};
   for (const Metric metric :
        {Metric::kPositionM, Metric::kPositionRad, Metric::kPoseM, Metric::kPoseRad}) {
     const double value = ValueOf(pair.metrics, metric);
@@ -82,7 +81,7 @@ EngineComparison CompareStockFriction(const Prepared& prepared, const Trace& tru
     const SimulatedWitness witness =
         RunSimulation(scenario, stock, prepared.MakeDrivenMotion(), options, progress);
     *wall_s += witness.run.summary.wall_s;
-    FrictionError error{.check = {}, .unit = {}};
+    FrictionError error{.check = {}};
     if (witness.run.summary.ok()) {
       error = FrictionErrorOf(input, witness.run.trace, truth);
     } else {

@@ -8,22 +8,18 @@
 #include <new>
 #include <string>
 
-#include "base/demand.h"
 #include "base/files.h"
 #include "base/json_text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "cli/trust.h"
 #include "features/certify/certificate_report.h"
 #include "features/run/default_setup.h"
 #include "features/run/run_scenario.h"
 #include "mechanism/channels.h"
 #include "report/report.h"
 #include "verify/check_file.h"
-#include "verify/model_text.h"
-#include "verify/trace_data.h"
 
 namespace mbv {
 namespace {

@@ -12,11 +12,13 @@
 #include <string>
 #include <vector>
 
+#include "base/demand.h"
 #include "base/files.h"
 #include "base/inputs.h"
 #include "base/output_folder.h"
 #include "base/text.h"
-#include "comparison/derivatives.h"
+#include "comparison/comparison.h"
+#include "comparison/force_band.h"
 #include "comparison/metrics.h"
 #include "features/equation_audit/audit.h"
 #include "features/mjcf_audit/source_audit.h"
@@ -30,22 +32,20 @@
 #include "model_file/yaml/parsed_documents.h"
 #include "reference/reference.h"
 #include "render/scene.h"
-#include "report/csv.h"
+#include "report/data/data_file.h"
 #include "report/html_report.h"
-#include "report/json.h"
 #include "report/report.h"
 #include "report/singular_poses.h"
 #include "scenario/find_model.h"
-#include "scenario/motion_reader.h"
 #include "scenario/tables/table.h"
 #include "verify/check_file.h"
 #include "verify/drive_by.h"
 #include "verify/pictures.h"
 #include "verify/run_witnesses.h"
-#include "verify/trace_data.h"
 #include "verify/version.h"
 
 namespace mbv {
+
 namespace {
 
 // Was a table made with another value of g than the model has?
@@ -486,8 +486,7 @@ class ScenarioRun {
           settings.step_s, options.step_s);
     } else if (same != nullptr && same->value < kStepsShare * worst->value) {
       attribution.text += fmt::format(
-          "{}with simulation.step_s = {:g} the worst check, {}, falls from "
-          "{:.1e} to {:.1e}",
+          "{}with simulation.step_s = {:g} the worst check, {}, falls from {:.1e} to {:.1e}",
           attribution.text.empty() ? "" : "; ", options.step_s, worst->name, worst->value,
           same->value);
     }
@@ -669,7 +668,7 @@ bool SameText(const fs::path& a, const fs::path& b) {
 }
 
 HtmlAudit ToHtmlAudit(const AuditTable& table) {
-  HtmlAudit audit{.source = table.source, .rows = {}, .note = {}};
+  HtmlAudit audit{.source = table.source};
   for (const AuditRow& row : table.rows) {
     audit.rows.push_back({.equation = row.equation,
                           .erratum = row.erratum,
@@ -697,7 +696,7 @@ HtmlAudit RunAudit(const AuditEntry& entry, const fs::path& models, const std::s
   return audit;
 }
 
-// The audit of the mechanism's paper; none for mechanisms of one's own. It is about the models that
+// The audit of the mechanism's paper; none for user-defined mechanisms. It is about the models that
 // the program came with, so a run of a model that was changed only says where it is. A run that is
 // compared does not end because its page lacks a section.
 std::optional<HtmlAudit> AuditOf(const Report& report, const std::string& kept) {
@@ -705,7 +704,6 @@ std::optional<HtmlAudit> AuditOf(const Report& report, const std::string& kept) 
     if (entry.mechanism != report.mechanism) continue;
     const auto note = [&](const std::string& why) {
       return HtmlAudit{.source = {},
-                       .rows = {},
                        .note = why + fmt::format("; the paper's equations are audited with the "
                                                  "shipped model: mbverify audit {}",
                                                  entry.mechanism)};
@@ -748,9 +746,7 @@ std::string RunPage(const Report& report, const Mechanism& mechanism,
                   .mechanism = &mechanism,
                   .X_WB = simulation == nullptr ? nullptr : &simulation->X_WB,
                   .paints = PaintsOf(mechanism),
-                  .pictures = {},
                   .audit = AuditOf(report, page.kept_audits),
-                  .arguments = {},
                   .script_link = page.script_link};
   size_t bytes = 0;
   for (const PictureFile& picture : pictures) {
@@ -762,6 +758,53 @@ std::string RunPage(const Report& report, const Mechanism& mechanism,
     input.arguments.push_back(fmt::format("--set '{}={}'", key, value));
   }
   return ToHtml(input);
+}
+
+namespace {
+
+DataAbout AboutOf(const Report& report) {
+  DataAbout about = {
+      {"mechanism", report.mechanism},      {"scenario", report.scenario},
+      {"description", report.description},  {"verdict", ToText(report.comparison.verdict)},
+      {"reason", report.comparison.reason}, {"simulation", report.simulation}};
+  for (const auto& [program, version] : report.versions) {
+    if (program == "mbverify") about.emplace_back(program, version);
+  }
+  return about;
+}
+
+constexpr const char* kCsvWord = "csv";
+
+}  // namespace
+
+std::vector<std::string> DataWords() {
+  std::vector<std::string> words = {kCsvWord};
+  for (const DataFormat& format : DataFormats()) words.emplace_back(format.word);
+  return words;
+}
+
+std::vector<std::pair<std::string, std::string>> DataFilesOf(const Report& report,
+                                                             const std::vector<std::string>& words,
+                                                             std::string* trouble) {
+  std::vector<Trace> shown;
+  for (const WitnessRecord& witness : report.witnesses) {
+    if (!witness.trace.time_s.empty()) shown.push_back(AsShown(witness.trace));
+  }
+  std::vector<const Trace*> traces;
+  traces.reserve(shown.size());
+  for (const Trace& trace : shown) traces.push_back(&trace);
+  std::vector<std::pair<std::string, std::string>> files;
+  for (const std::string& word : words) {
+    if (word == kCsvWord) {
+      files.emplace_back(kCsvMetadataFile, CsvMetadata(report));
+      continue;
+    }
+    const DataFormat* format = FindDataFormat(word);
+    MBV_DEMAND(format != nullptr, word);
+    files.emplace_back(format->file, DataBytes(*format, AboutOf(report), traces, trouble));
+    if (!trouble->empty()) return {};
+  }
+  return files;
 }
 
 }  // namespace mbv

@@ -339,7 +339,7 @@ bool StandinBranches::Fits(Eigen::Index drive, const VecX& q, double m) const {
   return std::abs(impl_->Off(limb, q, m)) < kSamePoint * size;
 }
 
-void StandinBranches::Doubt(Eigen::Index drive) {
+void StandinBranches::Recheck(Eigen::Index drive) {
   impl_->limbs[Nth(drive)].kind = Limb::Kind::kUnknown;
 }
 

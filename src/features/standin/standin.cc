@@ -420,7 +420,7 @@ class StandinComputer {
   // What the reference finds decides whether a limb is what it was taken for.
   void CheckLimb(Eigen::Index k, const VecX& q, double drive) {
     if (branches_->Fits(k, q, drive)) return;
-    branches_->Doubt(k);
+    branches_->Recheck(k);
     doubted_ = true;
   }
 

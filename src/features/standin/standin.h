@@ -24,11 +24,54 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "features/standin/transmission.h"
+#include "base/diagnostics.h"
+#include "base/json_text.h"
+#include "features/code/code.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "report/document.h"
 
 namespace mbv {
+
+// Which drives move chosen joints of a robot through its loops, and the parts that forces are
+// counted in: what a serial model of these joints has, and what it leaves out.
+
+struct Transmission {
+  std::vector<NamedCoordinate> joints;  ///< n, as chosen
+  std::vector<int> drives;              ///< n that move them, by index into Mechanism::drives
+  std::vector<CoordinateRange> ranges;  ///< per drive: its own, and that of its joint
+  std::vector<NamedCoordinate> held;    ///< the other degrees of freedom, which stay at home
+  std::vector<int> loop_bodies;         ///< that a serial model does not have: cranks and rods
+  std::vector<int> toward_world;        ///< per body: joint on its way to the world, -1: none
+  std::vector<bool> kept;               ///< per body: a serial model has it, or it is the world
+  std::vector<std::string> notes;       ///< what is left out or taken otherwise
+
+  /// The robot, rotors of its motors included as elements (RotorLaw) on their drives.
+  Mechanism full;
+  Mechanism without_rotors;  ///< the same without rotors of elements and motors
+  /// Without what the loops add: loop bodies have no mass, and springs, dampers and friction act
+  /// only where no loop body or drive of `drives` in a loop takes part. Along the joints it needs
+  /// the forces that the robot needs with the loops cut away [virtual work].
+  Mechanism serial;
+  Mechanism loop_inertia;  ///< the loop bodies' masses alone: no gravity, no other forces
+
+  [[nodiscard]] std::vector<Coordinate> coordinates() const;  ///< joints, then held
+};
+
+/// Coordinates of joints called `names`; nothing after an error: unknown, chosen twice, dependent
+/// on each other, or not as many as the drives that move them. Drives too many that also move
+/// joints on the way from the world to the chosen ones (a knee above an ankle) are held.
+[[nodiscard]] std::optional<Transmission> FindTransmission(const Mechanism& mechanism,
+                                                           const std::vector<std::string>& names,
+                                                           Diagnostics* diagnostics);
+
+/// The same robot with all that stays still, while the chosen joints move and the other degrees of
+/// freedom are held, as part of the world: other legs, and the leg above an ankle. Maps, inertias
+/// and forces along the joints are the same. Without outputs, contacts and beams.
+[[nodiscard]] Mechanism MovingPart(const Mechanism& mechanism, const Transmission& transmission);
 
 /// [rad or m] of a chosen joint.
 struct StandinRange {
@@ -38,7 +81,7 @@ struct StandinRange {
 
 /// A motion of the chosen joints to compare along.
 struct StandinMotion {
-  std::string name, text;          ///< of the scene
+  std::string name, text = {};     ///< of the scene
   std::vector<VecX> q, v, a = {};  ///< per sample, in the joints' order [rad or m, per s, s²]
 };
 
@@ -174,7 +217,7 @@ class StandinBranches {
   /// "crank and rod", "slider and rod", "cylinder", "leg", "the joint itself"; "": unknown.
   [[nodiscard]] std::string KindOf(Eigen::Index drive) const;
   /// The limb of a drive counts as unknown from here on.
-  void Doubt(Eigen::Index drive);
+  void Recheck(Eigen::Index drive);
   /// (1) holds; true of unknown ones.
   [[nodiscard]] bool Fits(Eigen::Index drive, const VecX& q, double m) const;
   /// All positions of a drive at a pose of the joints: two, one or none. `apart`: of two of them.
@@ -196,5 +239,64 @@ class StandinBranches {
                                            const std::vector<std::string>& joints,
                                            const StandinSettings& settings,
                                            const std::function<void(double)>& progress = {});
+
+// What replaces a hand-written stand-in, each with its verdict: code of the transmission and of
+// what the serial model leaves out, a lookup table with bounds, and the serial robot as MJCF and
+// URDF.
+//
+//   τ_m = J⁻ᵀ (τ_s + f_l + f_r)                                                             (1)
+// τ_s: forces along the joints that the serial model needs; f_l + f_r: of loop bodies and rotors,
+// in the code. With (1) nothing is left out.
+
+/// A file of the serial robot, read back as its users would.
+struct SerialFile {
+  std::string name;
+  std::string not_judged = {};  ///< why; "": it was
+  /// Largest difference of the forces along the joints from the serial model's with the best
+  /// constant armature, by their largest value.
+  double difference = kNan;
+
+  static constexpr double kLimit = 1e-9;
+  [[nodiscard]] bool agrees() const { return not_judged.empty() && difference <= kLimit; }
+};
+
+struct StandinExport {
+  CodeResult code;  ///< its judgements are those of (1) against the full loop
+  std::vector<SerialFile> serial;
+  std::vector<std::pair<std::string, std::string>> files;  ///< name, content
+
+  [[nodiscard]] bool agrees() const;
+};
+
+/// The robot without its loop bodies: the chosen joints are driven, with `armature` [kg m² or kg]
+/// each.
+[[nodiscard]] Mechanism SerialRobot(const Transmission& transmission, const VecX& armature);
+
+/// `name`: of the files.
+[[nodiscard]] StandinExport ExportStandin(const Mechanism& mechanism, const StandinResult& result,
+                                          const std::string& name,
+                                          const std::function<void(double)>& progress = {});
+
+[[nodiscard]] std::string ToText(const StandinExport& made);
+[[nodiscard]] nlohmann::ordered_json ToJson(const StandinExport& made, const std::string& model);
+
+// What mbverify standin found, for terminal, page and programs.
+
+/// One sentence: how wrong a serial model is, and what helps most.
+[[nodiscard]] std::string VerdictOf(const StandinResult& result);
+
+/// Sentences to act on, the most important first.
+[[nodiscard]] std::vector<std::string> AdviceOf(const StandinResult& result);
+
+[[nodiscard]] std::string ToText(const StandinResult& result, const TextStyle& style);
+
+/// Without `schema` and `program`.
+[[nodiscard]] nlohmann::ordered_json ToJson(const StandinResult& result,
+                                            const std::string& mechanism);
+
+/// A row per pose, in the units of the headings.
+[[nodiscard]] std::string StandinCsv(const StandinResult& result);
+
+[[nodiscard]] std::string StandinPage(const StandinResult& result, const std::string& mechanism);
 
 }  // namespace mbv

@@ -5,25 +5,21 @@
 #include <memory>
 
 #include "base/files.h"
-#include "base/json_text.h"
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "features/standin/standin_export.h"
-#include "features/standin/standin_report.h"
+#include "features/standin/standin.h"
 #include "kinematics/constraints.h"
 #include "model_file/load_model.h"
 #include "model_file/write_model.h"
-#include "model_file/yaml/units.h"
 #include "reference/reference.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
 #include "scenario/tables/motion_table.h"
 #include "scenario/tables/text.h"
-#include "verify/model_text.h"
 
 namespace mbv {
 namespace {
@@ -150,7 +146,7 @@ std::optional<StandinMotion> ScenarioMotion(const std::string& file, const Mecha
     }
     coordinates.push_back(at->coordinate);
   }
-  StandinMotion result{.name = "along " + loaded.scenario->name, .text = {}, .q = {}, .v = {}};
+  StandinMotion result{.name = "along " + loaded.scenario->name, .q = {}, .v = {}};
   ReferenceSolver solver(mechanism, motion);
   CommandSample command;
   ReferenceSample sample;

@@ -1,4 +1,4 @@
-#include "features/standin/standin_export.h"
+#include "features/standin/standin.h"
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -7,7 +7,6 @@
 
 #include "base/files.h"
 #include "base/scratch_folder.h"
-#include "base/text.h"
 #include "kinematics/command_rank.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/spanning_tree.h"

@@ -1,4 +1,4 @@
-#include "features/standin/standin_report.h"
+#include "features/standin/standin.h"
 
 #include <fmt/format.h>
 #include <Eigen/LU>
@@ -36,7 +36,7 @@ std::string Percent(double share) {
 double InShownUnit(double value, const std::string& unit) {
   return unit == "rad" ? value * 180.0 / std::numbers::pi : 1000.0 * value;
 }
-// Of a position: round-off is no number.
+// Of a position: round-off is not a number.
 std::string Position(double value, const std::string& unit) {
   const double shown = InShownUnit(value, unit);
   return Short(std::abs(shown) < 1e-9 ? 0.0 : shown);
@@ -416,7 +416,6 @@ void AddMap(const StandinResult& result, const std::string& title, const std::st
                .x_label = label(0),
                .y_label = label(1),
                .value_label = "[" + unit + "]",
-               .values = {},
                .log_scale = log};
   const auto edges = [&](size_t k, double* low, double* high) {
     const StandinRange& range = result.ranges[k];
@@ -464,14 +463,13 @@ void AddPolygons(const StandinResult& result, bool torque, ReportSection* sectio
                                 : "Joint rates that the motors can give",
                 .x_label = label(0),
                 .y_label = label(1),
-                .equal_scale = result.joint_units[0] == result.joint_units[1],
-                .lines = {}};
+                .equal_scale = result.joint_units[0] == result.joint_units[1]};
   StandinPose home;
   home.J = result.J_home;
   const size_t worst = torque ? result.worst_torque : result.worst_speed;
   const size_t type2 = NearestType2(result), type1 = NearestType1(result);
   const auto add = [&](const std::string& name, const StandinPose& pose, bool dashed) {
-    PlotLine line{.label = name, .points = {}, .closed = true, .dashed = dashed};
+    PlotLine line{.label = name, .closed = true, .dashed = dashed};
     for (const auto& [x, y] : CornersAt(result, pose, torque)) line.points.emplace_back(x, y);
     plot.lines.push_back(std::move(line));
   };
@@ -493,15 +491,11 @@ std::vector<ReportSection> SectionsOf(const StandinResult& result) {
   for (const StandinScene& scene : result.scenes) error.Add(SceneTable(result, scene));
   error.Note(
       "Motor torques of the full loop less those of the serial model, by cause: constant ratio, "
-      "the "
-      "neutral J instead of J(q); rotors, their inertia beyond the best constant armature; "
-      "velocity, "
-      "terms of rotors and loop bodies that are quadratic in the rates; loop bodies, their mass "
-      "and "
-      "what else acts on them. The causes add up to the whole. Each number is of magnitudes, so "
-      "that "
-      "their medians do not. Needed: the 95th percentile of the drive's torque in the full loop "
-      "over the same states.");
+      "the neutral J instead of J(q); rotors, their inertia beyond the best constant armature; "
+      "velocity, terms of rotors and loop bodies that are quadratic in the rates; loop bodies, "
+      "their mass and what else acts on them. The causes add up to the whole. Each number is of "
+      "magnitudes, so that their medians do not. Needed: the 95th percentile of the drive's torque "
+      "in the full loop over the same states.");
   for (size_t d = 0; d < result.drives.size(); ++d) {
     AddMap(
         result, "error at rest: " + result.drives[d], ForceUnitOf(result.drive_units[d]),

@@ -1,9 +1,8 @@
-#include "features/standin/transmission.h"
+#include "features/standin/standin.h"
 
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <set>
 
 #include "base/text.h"
@@ -65,8 +64,9 @@ class TransmissionFinder {
         return Error("'" + name + "' is chosen twice", "each joint once");
       }
       if (IsOfBall(JointOf(at->coordinate).kind, at->coordinate.component)) {
-        return Error("'" + name + "' is a ball's: it has no axis that a serial joint could have",
-                     "choose joints with axes");
+        return Error(
+            "'" + name + "' is of a spherical joint: it has no axis that a serial joint could have",
+            "choose joints with axes");
       }
       for (const Prescribed& prescribed : mechanism_.prescribed) {
         if (prescribed.joint == at->coordinate.index) {

@@ -9,8 +9,7 @@
 #include "base/text.h"
 #include "reference/frame_stiffness.h"
 #include "reference/reference.h"
-#include "report/json.h"
-#include "scenario/motion_reader.h"
+#include "report/report.h"
 #include "simulation/engine/compliant.h"
 #include "verify/run_witnesses.h"
 #include "verify/version.h"
@@ -145,9 +144,7 @@ class Runner {
     ComparisonInput input{.mechanism = &prepared_.base,
                           .motion = &scenario_.motion,
                           .limits = scenario_.checks,
-                          .witnesses = {},
                           .driven_by = {},
-                          .reactions_not_unique = {},
                           .own_parameters = OwnParameters(scenario_, prepared_.base),
                           .left_out = TextsOf(scenario_.model_caveats, ModelCaveat::Kind::kLeftOut),
                           .of_stiffness = true};

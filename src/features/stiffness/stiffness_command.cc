@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <memory>
 
 #include "base/output_folder.h"
@@ -258,7 +257,8 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
   stiffness->add_option("--closed-form", arguments->closed_form,
                         "formulation, e.g. as_printed: the paper's own");
   stiffness
-      ->add_option("--loads", arguments->loads.count, "displacements under so many random wrenches")
+      ->add_option("--loads", arguments->loads.count,
+                   "displacements under this many random wrenches")
       ->check(CLI::Range(1, 10000));
   stiffness->add_option("--seed", arguments->loads.seed, "of the random wrenches")
       ->check(WholeNumber())
@@ -273,8 +273,7 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
   stiffness->add_option(
       "--map", arguments->maps,
       "map over two coordinates: NAME=LOW:HIGH:POINTS twice (default: the ranges of the "
-      "mechanism's usual map) and others NAME=VALUE; 'usual' draws all usual maps "
-      "(repeatable)");
+      "mechanism's usual map) and others NAME=VALUE; 'usual' draws all usual maps (repeatable)");
   stiffness->add_option("--index", arguments->indices, "index to draw on maps (repeatable)")
       ->allow_extra_args(false);
   stiffness->add_option("--jobs", arguments->jobs, "processes at once for maps")

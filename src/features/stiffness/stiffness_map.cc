@@ -16,7 +16,6 @@
 #include "model_file/yaml/yaml_reader.h"
 #include "plot/svg_plot.h"
 #include "reference/frame_stiffness.h"
-#include "scenario/motion_reader.h"
 #include "verify/ranges.h"
 
 namespace mbv {
@@ -53,7 +52,7 @@ std::vector<std::string> Chosen(const MapResult& result, const std::vector<std::
   return chosen;
 }
 
-// People read millimetres and degrees.
+// Pages show millimetres and degrees.
 double FactorOf(const std::string& unit) {
   return unit == "m" ? 1e3 : unit == "rad" ? 180.0 / std::numbers::pi : 1.0;
 }

@@ -305,8 +305,7 @@ ReportSection ElementSection(const StiffnessReport& report) {
               .columns = {Text("element"), Digits("weakest force"), Digits("weakest moment")}};
   for (int i = 0; i < 6; ++i) table.columns.push_back(Digits(AxisName(i)));
   BarPlot bars{.title = "Compliance caused by each element",
-               .columns = {"against the weakest force", "against the weakest moment"},
-               .rows = {}};
+               .columns = {"against the weakest force", "against the weakest moment"}};
   for (const Contribution& row : Contributions(witness->result)) {
     std::vector<Cell> cells = {row.element};
     AddCells(std::array{100 * row.translation, 100 * row.rotation}, "{:.2f}", &cells);
@@ -326,12 +325,11 @@ ReportSection ElementSection(const StiffnessReport& report) {
 LinePlot LoadPlot(const StiffnessReport& report, const ShownPair& pair, int axis) {
   LinePlot plot{.title = fmt::format("Displacement along {}", AxisName(axis)),
                 .x_label = "load",
-                .y_label = fmt::format("{} [mm]", AxisName(axis)),
-                .lines = {}};
+                .y_label = fmt::format("{} [mm]", AxisName(axis))};
   std::vector<const StiffnessWitness*> shown = {pair.measured, pair.truth};
   for (const StiffnessWitness& witness : report.printed) shown.push_back(&witness);
   for (const StiffnessWitness* witness : shown) {
-    PlotLine line{.label = witness->name, .points = {}, .markers = witness == pair.measured};
+    PlotLine line{.label = witness->name, .markers = witness == pair.measured};
     for (size_t k = 0; k < witness->displacements.size(); ++k) {
       line.points.emplace_back(static_cast<double>(k + 1), 1e3 * witness->displacements[k][axis]);
     }
@@ -344,11 +342,10 @@ LinePlot ErrorPlot(const ShownPair& pair) {
   LinePlot plot{.title = pair.text() + ": error per load",
                 .x_label = "load",
                 .y_label = "error, percent",
-                .log_y = true,
-                .lines = {}};
+                .log_y = true};
   const LoadErrors& errors = *pair.difference.loads;
   const auto add = [&](const std::string& label, const auto& error) {
-    PlotLine line{.label = label, .points = {}};
+    PlotLine line{.label = label};
     for (size_t k = 0; k < errors.vector.size(); ++k) {
       line.points.emplace_back(static_cast<double>(k + 1), 100 * error(k));
     }

@@ -10,11 +10,9 @@
 #include "base/text.h"
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
-#include "scenario/checks.h"
 #include "scenario/file_parts.h"
 #include "scenario/find_model.h"
-#include "scenario/motion_reader.h"
-#include "scenario/settings_reader.h"
+#include "scenario/section_readers.h"
 
 namespace mbv {
 

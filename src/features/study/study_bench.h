@@ -12,7 +12,7 @@
 #include "base/diagnostics.h"
 #include "base/inputs.h"
 #include "features/study/design.h"
-#include "features/study/point_row.h"
+#include "features/study/summary.h"
 #include "features/study/validation.h"
 #include "verify/prepare.h"
 #include "verify/run_witnesses.h"
@@ -32,10 +32,10 @@ inline constexpr size_t kBandTimes = 240;
 
 /// What a measured table says at these times, and how exact the nominal run is.
 struct MeasuredForces {
-  std::string table;                    ///< file name; "" where nothing is validated
-  std::string numerical;                ///< where u_num is from
-  std::vector<ForceComparison> drives;  ///< those that the table has; u_input is still empty
-  std::vector<size_t> places;           ///< of these drives in StudyForces::drives
+  std::string table;                         ///< file name; "" where nothing is validated
+  std::string numerical;                     ///< where u_num is from
+  std::vector<ForceComparison> drives = {};  ///< those that the table has; u_input is still empty
+  std::vector<size_t> places;                ///< of these drives in StudyForces::drives
 };
 
 struct StudyPoint {
@@ -145,8 +145,8 @@ struct PointsDone {
 struct StudyRun {
   const Prepared* prepared = nullptr;
   WitnessRuns runs;
-  std::vector<const WitnessRecord*> witnesses;  ///< those named, in their order
-  std::string failure;                          ///< why there is nothing to measure; "" otherwise
+  std::vector<const WitnessRecord*> witnesses = {};  ///< those named, in their order
+  std::string failure;  ///< why there is nothing to measure; "" otherwise
 };
 /// `prepared` must outlive the result.
 [[nodiscard]] StudyRun RunStudyWitnesses(const Prepared& prepared,
@@ -172,5 +172,22 @@ struct StudyMeasures {
 /// `motor_margin` is the smallest margin.
 [[nodiscard]] StudyMeasures MeasureQuantities(const StudyRun& run,
                                               const std::vector<StudyQuantity>& quantities);
+
+// A study's nominal forces against the table in the reference's place
+// (features/study/validation.h).
+
+/// The table on the scenario's grid of samples.
+[[nodiscard]] AlignedTable TableOf(const Prepared& prepared);
+
+/// Of the first witness, at the times of `forces`. u_num: as stated, else what the first witness
+/// differs by from the second one (RMS), 0 if it is alone.
+[[nodiscard]] MeasuredForces MeasureForces(const AlignedTable& table, const StudyRun& run,
+                                           const StudyForces& forces,
+                                           const StudyValidation& settings);
+
+/// All of it, with the deviations of the records in `file` (kForcesFile). Where the first witness
+/// has a step, u_num is half the grid convergence index of `mbverify converge`, unless stated.
+[[nodiscard]] StudyValidationResult ValidateStudy(const StudyBench& bench,
+                                                  const std::filesystem::path& file);
 
 }  // namespace mbv

@@ -14,7 +14,6 @@
 
 #include "base/files.h"
 #include "base/inputs.h"
-#include "base/names.h"
 #include "base/text.h"
 #include "features/study/design.h"
 #include "mechanism/mechanism.h"
@@ -23,7 +22,7 @@
 #include "scenario/file_parts.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
-#include "scenario/settings_reader.h"
+#include "scenario/section_readers.h"
 #include "scenario/tables/text.h"
 #include "verify/check_file.h"
 
@@ -786,8 +785,7 @@ Design ReadDesign(ValueReader* values, const YamlNode& node, const std::vector<F
   }
   if (map.valid() && given.size() != 1) {
     yaml.Error(node,
-               "design: give one of sobol, saltelli, latin_hypercube, grid, one_at_a_time, "
-               "list",
+               "design: give one of sobol, saltelli, latin_hypercube, grid, one_at_a_time, list",
                "e.g. design: {sobol: 256}");
   }
   if (given.size() != 1) return design;

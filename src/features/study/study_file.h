@@ -15,7 +15,7 @@ namespace mbv {
 /// A study with more points is a mistake, unless the option for it is given.
 inline constexpr std::uint64_t kMostStudyPoints = 10'000'000;
 
-/// How many points are drawn and from which seed, where options ask for others than the file.
+/// How many points are drawn and from which seed, where options differ from the file.
 struct DrawnDesign {
   std::optional<std::uint64_t> count = {}, seed = {};
 };

@@ -8,6 +8,7 @@
 
 #include "features/study/summary.h"
 #include "features/study/validation.h"
+#include "math/plot.h"
 #include "report/document.h"
 
 namespace mbv {
@@ -60,5 +61,27 @@ struct StudyPlot;
 [[nodiscard]] std::string ToJson(const StudyReport& report);
 /// report.html.
 [[nodiscard]] std::string ToHtml(const StudyReport& report);
+
+// Plots of a study: each is a file of its own, and stands in a section of the page.
+
+/// Sections of the page that have plots.
+enum class StudySection { kIndices, kTornado, kBands, kValidation, kHistograms, kScatter };
+
+struct StudyPlot {
+  StudySection section;
+  std::string file;  ///< "band_limb1.drive.svg", unique and fit for any disk
+  std::string svg;
+  std::optional<LinePlot> lines = {};  ///< what is drawn, where it is lines
+};
+
+[[nodiscard]] std::vector<StudyPlot> StudyPlots(const StudyReport& report);
+
+/// Quantities over varied numbers, a dot per point.
+struct ScatterMatrix {
+  std::string title;
+  std::vector<std::string> columns, rows;           ///< names
+  std::vector<std::vector<double>> across, upward;  ///< per point: of columns, of rows
+};
+[[nodiscard]] std::string ToSvg(const ScatterMatrix& matrix);
 
 }  // namespace mbv

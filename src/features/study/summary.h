@@ -1,16 +1,77 @@
 // What all points of a study say together.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "features/study/point_row.h"
-#include "features/study/statistics.h"
+#include "base/types.h"
+#include "features/study/design.h"
 
 namespace mbv {
+
+// What many values of one quantity say: percentiles, histograms, shares with their uncertainty.
+
+struct Interval {
+  double lower = kNan, upper = kNan;
+};
+
+/// The value below which a share (0 … 1) of increasing values lies, linear between them; NaN of
+/// none.
+[[nodiscard]] double Percentile(std::span<const double> sorted, double share);
+
+/// The exact interval of a probability of which `hits` of `count` independent trials gave evidence
+/// [Clopper, Pearson 1934]: at most (1 − confidence)/2 beyond each end. NaN without trials.
+[[nodiscard]] Interval ClopperPearson(std::uint64_t hits, std::uint64_t count,
+                                      double confidence = 0.95);
+
+struct Histogram {
+  double from = kNan, to = kNan;
+  std::vector<std::uint64_t> counts;  ///< of equal bins; the last one has both its ends
+};
+/// Bins by Freedman and Diaconis' rule, 5 … 60 of them; one where all values are the same.
+[[nodiscard]] Histogram HistogramOf(std::span<const double> sorted);
+
+// Sobol' indices: which share of a quantity's variance each varied number makes, alone and with all
+// others.
+
+struct SobolIndex {
+  double first = kNan;  ///< share of the variance that goes when this number alone is known
+  double total = kNan;  ///< share that is left when all others are known
+  Interval first_interval, total_interval;  ///< 95 %, bootstrap of blocks
+};
+
+struct SobolResult {
+  std::vector<SobolIndex> indices;  ///< per number
+  double mean = kNan, variance = kNan;
+  size_t blocks = 0, left_out = 0;  ///< used; without a value at some of their points
+};
+
+/// `values`: blocks × (numbers + 2), as DesignKind::kSaltelli orders them. First order by
+/// [Saltelli 2010, Comput. Phys. Commun. 181, Table 2 (b)], total by [Jansen 1999, ibid. (f)], of
+/// values less their mean. A constant quantity has no indices (NaN).
+[[nodiscard]] SobolResult SobolIndices(std::span<const double> values, size_t numbers);
+
+// A row of points.csv: what one point of a study gave.
+
+struct PointRow {
+  std::uint64_t point = 0;  ///< its number
+  int exit_code = 0;        ///< as of `mbverify run`; 1: witnesses disagree, values are there
+  std::string reason;       ///< why it has no values; "" if it has
+  std::vector<double> varied, values = {};
+};
+
+/// "point,seed,exit,reason,…": names of factors and quantities.
+[[nodiscard]] std::string PointHeader(const Study& study);
+/// One line with its end; numbers in 17 digits, nothing for what is not a number.
+[[nodiscard]] std::string PointLine(const PointRow& row, const Study& study);
+/// Reads such a line (without its end) back; empty if it is not a row of this study.
+[[nodiscard]] std::optional<PointRow> ReadPointLine(std::string_view line, const Study& study);
 
 /// Calls its argument with every row of a study, in the order of their numbers; as often as asked.
 using PointRows = std::function<void(const std::function<void(const PointRow&)>&)>;

@@ -40,7 +40,7 @@ struct DriveValidation {
 };
 
 struct StudyValidationResult {
-  std::vector<DriveValidation> drives;
+  std::vector<DriveValidation> drives = {};
   std::string table;      ///< file name of the measured forces
   std::string numerical;  ///< where u_num is from, to read
   std::string trouble;    ///< why there is no result; "" if there is one

@@ -427,7 +427,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       const Vec2 tail =
           (x * nodes.last.transpose()).cwiseAbs() + (x * nodes.one_before.transpose()).cwiseAbs();
       failed = tail.maxCoeff() > kTail * size && h > kLeastStep;
-      if (failed) why = "it bends too much";
+      if (failed) why = "it curves too much";
       if (!failed) {
         const Vec2 span = x.rowwise().maxCoeff() - x.rowwise().minCoeff();
         // From the start: less rounding.

@@ -487,8 +487,8 @@ MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension) {
 
 namespace {
 
-// Of a process that reads a file of so many bytes: more is not needed, whatever the file asks for.
-// (Sanitizers reserve memory as they like.)
+// Of a process that reads a file of this many bytes: more is not needed, whatever the file asks
+// for. (Sanitizers reserve memory as they like.)
 void LimitMemory([[maybe_unused]] size_t bytes) {
 #ifndef __SANITIZE_ADDRESS__
   constexpr rlim_t kLeast = 512UL << 20, kPerByte = 200;

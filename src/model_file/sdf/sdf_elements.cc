@@ -380,9 +380,9 @@ class Inspector {
     const bool good = text.starts_with("1.") &&
                       std::from_chars(text.data() + 2, end, minor).ptr == end && minor <= kNewest;
     if (good) return;
-    Refuse(
-        file_, sdf.GetLineNum(),
-        fmt::format("version = '{}' of <sdf> is none of 1.0 … 1.{}", QuotedValue(text), kNewest));
+    Refuse(file_, sdf.GetLineNum(),
+           fmt::format("version = '{}' of <sdf> is not one of 1.0 … 1.{}", QuotedValue(text),
+                       kNewest));
   }
 
   void CheckJointType(const XMLElement& joint) {

@@ -11,7 +11,7 @@
 #include <set>
 #include <string_view>
 
-#include "base/names.h"
+#include "base/files.h"
 #include "base/text.h"
 #include "math/spatial.h"
 #include "mechanism/joint_pose.h"

@@ -250,7 +250,7 @@ constexpr std::array kCommonKeys = {"name",   "description", "title",  "version"
                                     "type",   "parameters",  "source", "license", "date",
                                     "author", "units",       "label",  "notes",   "schema"};
 
-// Of a key of so many letters, how many may be wrong.
+// Of a key of this many letters, how many may be wrong.
 bool IsNear(const std::string& key, const std::vector<std::string>& keys) {
   constexpr size_t kShortest = 4;
   return key.size() >= kShortest && !ClosestWord(key, keys).empty();

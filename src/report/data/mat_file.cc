@@ -31,7 +31,7 @@ Variable Number(const char* name, const double* values, size_t rows, size_t colu
   return Create(name, MAT_C_DOUBLE, MAT_T_DOUBLE, rows, columns, values);
 }
 
-// MATLAB's characters have two bytes; others than ASCII's become a question mark.
+// MATLAB's characters have two bytes; Others but ASCII's become a question mark.
 Variable Text(const char* name, const std::string& text) {
   std::vector<std::uint16_t> letters;
   for (const char c : text) {

@@ -1,4 +1,4 @@
-#include "scenario/tables/columns.h"
+#include "scenario/tables/table.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "base/text.h"
 #include "mechanism/channels.h"
-#include "scenario/tables/units.h"
+#include "scenario/tables/text.h"
 
 namespace mbv {
 namespace {
@@ -23,15 +23,6 @@ std::string Plain(std::string_view text) {
     if (std::isalnum(u) != 0 || u >= 0x80) plain += static_cast<char>(std::tolower(u));
   }
   return plain;
-}
-
-std::string Listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (size_t i = 0; i < std::min(names.size(), kMostNamed); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  if (names.size() > kMostNamed) text += fmt::format(" and {} more", names.size() - kMostNamed);
-  return text;
 }
 
 class Mapper {
@@ -114,7 +105,7 @@ class Mapper {
     const std::string otherwise =
         names.empty()
             ? fmt::format("it has no heading; give one of its {} columns by number", text_.columns)
-            : "its columns: " + Listed(names);
+            : "its columns: " + JoinedAndMore(names, kMostNamed);
     Fail(settings.place, fmt::format("{}: {} has no column '{}'", path, settings_.csv, wanted),
          DidYouMean(wanted, names, otherwise));
   }
@@ -334,7 +325,7 @@ class Mapper {
       ours = ours || heading.full.ends_with(".analytic") || heading.full.ends_with(".simulated");
     }
     std::string hint = "map them: columns: {time: 1, DRIVE.force: 2}";
-    if (!names.empty()) hint += "; its columns: " + Listed(names);
+    if (!names.empty()) hint += "; its columns: " + JoinedAndMore(names, kMostNamed);
     if (ours) hint += "; or state witness: analytic | simulated";
     yaml_->Error(settings_.place,
                  fmt::format("no column of {} is a signal of {}", settings_.csv, mechanism_.name),
@@ -343,7 +334,8 @@ class Mapper {
 
   void NoteUnits() {
     if (unitless_.empty()) return;
-    mapping_.notes.push_back("no unit is given, SI is assumed: " + Listed(unitless_));
+    mapping_.notes.push_back("no unit is given, SI is assumed: " +
+                             JoinedAndMore(unitless_, kMostNamed));
   }
 
   void NoteUnused() {
@@ -353,7 +345,8 @@ class Mapper {
     }
     if (unused.empty()) return;
     mapping_.notes.push_back(fmt::format("{} column{} not used: {}", unused.size(),
-                                         unused.size() == 1 ? " is" : "s are", Listed(unused)));
+                                         unused.size() == 1 ? " is" : "s are",
+                                         JoinedAndMore(unused, kMostNamed)));
   }
 
   const TableText& text_;

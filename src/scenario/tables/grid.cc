@@ -1,6 +1,6 @@
 // A table's rows on the grid of a scenario.
 
-#include "scenario/tables/grid.h"
+#include "scenario/tables/table.h"
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -11,7 +11,6 @@
 #include <numeric>
 
 #include "base/roles.h"
-#include "scenario/tables/table.h"
 
 namespace mbv {
 namespace {
@@ -204,8 +203,7 @@ class Aligner {
     }
     left_out_ = times_.size() - rows.size();
     out_.grid = fmt::format(
-        "{} of {} rows lie on the samples of the scenario (every {:g} ms); "
-        "nothing is interpolated",
+        "{} of {} rows lie on the samples of the scenario (every {:g} ms); nothing is interpolated",
         rows.size(), times_.size(), 1e3 * motion_.sample_s);
     return true;
   }

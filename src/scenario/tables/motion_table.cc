@@ -7,9 +7,8 @@
 #include <numbers>
 
 #include "base/text.h"
-#include "math/channel.h"
 #include "math/spatial.h"
-#include "scenario/tables/grid.h"
+#include "math/trace.h"
 #include "scenario/tables/table.h"
 #include "scenario/tables/table_spline.h"
 
@@ -19,7 +18,7 @@ namespace {
 constexpr size_t kFewestSplineRows = 6;  // that determine a quintic polynomial
 // A column of rates further from the positions' own, of their RMS, belongs to something else.
 constexpr double kRateUncertainty = 0.2;
-// A table that lasts more than so many motions may be in milliseconds.
+// A table that lasts more than this many motions may be in milliseconds.
 constexpr double kMilli = 300.0;
 
 class Loader {

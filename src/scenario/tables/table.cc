@@ -6,12 +6,9 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
-#include <sstream>
 
 #include "base/inputs.h"
 #include "mechanism/reach.h"
-#include "scenario/tables/columns.h"
-#include "scenario/tables/grid.h"
 #include "scenario/tables/text.h"
 
 namespace mbv {
@@ -212,7 +209,7 @@ namespace {
 
 constexpr size_t kMostFindings = 20;  // of one table
 constexpr size_t kFewestRows = 4;
-// Events write a time twice; where more than one row in so many is such a time, the printed times
+// Events write a time twice; where more than one row in this many is such a time, the printed times
 // have too few digits.
 constexpr size_t kRowsPerEvent = 20;
 

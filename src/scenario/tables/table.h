@@ -15,12 +15,14 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/roles.h"
 #include "base/types.h"
 #include "math/trace.h"
+#include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "model_file/yaml/value_reader.h"
 #include "scenario/tables/text.h"
@@ -46,7 +48,7 @@ struct TableColumn {
 
 struct ReferenceTable {
   std::string file;            ///< path
-  std::string name;            ///< file name, for people
+  std::string name;            ///< file name, to show
   std::vector<double> time_s;  ///< scenario time (offset and unit applied), increasing
   double stamp_error_s = 0.0;  ///< rounding of the time stamps, largest
   /// Equal steps up to the rounding of the stamps: row i was taken at time_s[0] + i·spacing_s.
@@ -148,5 +150,55 @@ void ReadTableColumnKeys(ValueReader* values, const YamlMap& map, TableColumnSet
                                                                   const Mechanism& mechanism,
                                                                   YamlReader* yaml,
                                                                   Diagnostics* diagnostics);
+
+// How the rows of a table lie in time.
+
+// Noise of sampled signals.
+
+/// Standard deviation of the noise in each column of `values` (rows at `time_s`, increasing): what
+/// a smooth curve cannot explain. A sample is predicted from its 2, 4, … 10 nearest neighbours by
+/// the polynomial through them; the median of the errors, scaled to what white noise of deviation
+/// 1 would give, estimates the deviation. The truncation error of a smooth signal falls with the
+/// number of neighbours while noise keeps its size, so the smallest of the estimates is taken.
+/// The median makes it robust against steps and kinks. Zero with fewer than kFewestForNoise rows.
+[[nodiscard]] std::vector<double> EstimateNoise(std::span<const double> time_s, const MatX& values);
+inline constexpr size_t kFewestForNoise = 16;
+
+/// Fills uniform, spacing_s and stamp_error_s from time_s (two rows at least): equal steps, equal
+/// steps rounded to the printed digits, or anything else.
+void DescribeTimes(ReferenceTable* table);
+
+/// The times at which the rows were taken: evened out where only rounding makes them uneven.
+[[nodiscard]] std::vector<double> TrueTimes(const ReferenceTable& table);
+
+// Which column of a table is which signal.
+
+/// A column to read.
+struct MappedColumn {
+  size_t index = 0;  ///< 0-based
+  TableColumn column;
+  bool unit_assumed = false;  ///< neither heading nor settings state one
+  /// For `tolerance:` and findings.
+  const TableColumnSettings* settings = nullptr;
+};
+
+/// All columns to read.
+struct TableMapping {
+  size_t time_index = 0;
+  double time_factor = 1.0;        ///< to seconds
+  bool time_unit_assumed = false;  ///< neither heading nor settings state one
+  std::vector<MappedColumn> columns;
+  std::vector<std::string> notes;  ///< automatic choices, assumed units, unused columns
+};
+
+/// Every signal a table may give: drives, outputs, prescribed joints' forces, joint reactions.
+[[nodiscard]] std::vector<Channel> TableSignals(const Mechanism& mechanism);
+
+/// Maps columns as the scenario says, the others by their names: a heading that is a signal's name,
+/// or that with `.reference` behind it as in our own traces.csv. Findings about the settings go to
+/// `yaml`, those about the file's units to `diagnostics`.
+[[nodiscard]] TableMapping MapColumns(const TableText& text, const TableSettings& settings,
+                                      const Mechanism& mechanism, YamlReader* yaml,
+                                      Diagnostics* diagnostics);
 
 }  // namespace mbv

@@ -108,8 +108,8 @@ class RowFit {
     return std::exp(low);
   }
 
-  // Logarithms of λ between what bends freely within the shortest step and what is a parabola over
-  // all rows.
+  // Logarithms of λ between what deforms freely within the shortest step and what is a parabola
+  // over all rows.
   [[nodiscard]] Span LambdaSpan() const {
     const double whole_s = rows_.time_s.back() - rows_.time_s.front();
     double shortest_s = whole_s;
@@ -313,9 +313,8 @@ class SplineMaker {
     if (table_.smoothed() || share <= kMostlyNoise) return;
     place_.yaml->AddAt(
         Severity::kWarning, place_.csv.line, place_.csv.column,
-        fmt::format("{}: the second derivative of {} is mostly noise: {:.0f} % of its mean "
-                    "square vanish when {:.2g} {} of noise are smoothed away (RMS {:.3g} "
-                    "of {:.3g} {}/s²)",
+        fmt::format("{}: the second derivative of {} is mostly noise: {:.0f} % of its mean square "
+                    "vanish when {:.2g} {} of noise are smoothed away (RMS {:.3g} of {:.3g} {}/s²)",
                     place_.path, place_.file, 100.0 * share, table_.deviation, table_.unit,
                     table_.acceleration_change_rms, table_.acceleration_rms, table_.unit),
         "drive forces follow it; smoothing: auto takes it out and says what that changes");

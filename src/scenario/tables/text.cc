@@ -9,8 +9,6 @@
 #include <string>
 #include <system_error>
 
-#include "scenario/tables/units.h"
-
 namespace mbv {
 namespace {
 

@@ -1,4 +1,4 @@
-#include "scenario/tables/units.h"
+#include "scenario/tables/text.h"
 
 #include <fmt/format.h>
 

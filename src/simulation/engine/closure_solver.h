@@ -6,11 +6,31 @@
 #include <vector>
 
 #include "base/run_summary.h"
+#include "math/rate_extrapolation.h"
 #include "math/sparse.h"
 #include "mechanism/motion.h"
 #include "simulation/engine/constraint_system.h"
+#include "simulation/engine/engine_model.h"
 
 namespace mbv::simulation {
+
+// Predicts the configuration at the next of equally spaced samples (math/rate_extrapolation.h).
+
+class SamplePredictor {
+ public:
+  /// The model outlives it.
+  explicit SamplePredictor(const EngineModel& engine) : engine_(engine) {}
+
+  /// Moves d.qpos to the next sample, h later, by the present d.qvel and d.qacc and those of the
+  /// calls before.
+  void Predict(double h, mjData* d);
+
+ private:
+  const EngineModel& engine_;
+  int known_ = 0;
+  RateHistory history_;
+  VecX u_;
+};
 
 class ClosureSolver {
  public:

@@ -334,7 +334,7 @@ std::vector<Vec3> JointPlaces(const ConstraintSystem& system) {
   return places;
 }
 
-// Where the drive positions alone would have led from home; empty: to the same place.
+// Where the drive positions alone would have gone from home; empty: to the same place.
 std::string WhereDrivesLead(const std::vector<Vec3>& places, const DrivenSample& first,
                             ConstraintSystem* system, ClosureSolver* solver) {
   const EngineModel& engine = system->engine();

@@ -371,7 +371,7 @@ Extrapolated Extrapolate(const std::array<VecX, kLevels>& D) {
 }
 
 RunSummary Trouble(Stop stop, const std::string& message) {
-  return {.stop = stop, .message = message, .where = {}, .unit = {}};
+  return {.stop = stop, .message = message};
 }
 
 class Witness {

@@ -120,7 +120,7 @@ class Statics {
 
   // At the last evaluated state.
   VecX f_, r_;
-  MatX J_;  // rows of loops and guides, then the output's if held
+  MatX J_;  // rows of loops and drives, then the output's if held
   MatX J_o_;
 };
 

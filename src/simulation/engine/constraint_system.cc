@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "math/spatial.h"
-#include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
 
 namespace mbv::simulation {

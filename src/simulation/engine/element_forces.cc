@@ -99,7 +99,6 @@ RunSummary GyroUnsupported(const ForceElement& element, const std::string& descr
                      "joint's coordinate: MuJoCo 2.2 has no inertia between a joint and a body "
                      "that turns",
           .where = element.name,
-          .unit = {},
           .names_where = true};
 }
 
@@ -122,13 +121,12 @@ RunSummary FrictionUnsupported(const EngineModel& engine, size_t e, const std::s
           .message = "element '" + element.name + "', " + Described(*engine.mechanism, element) +
                      ": " + why,
           .where = element.name,
-          .unit = {},
           .names_where = true};
 }
 
 // In free motion MuJoCo's rows hold friction at rest; by itself MuJoCo lets them do all of it.
 void AddHolding(const ConstraintSystem& system, size_t e, ElementMotion* at) {
-  if (system.friction_rows() == 0 || system.engine().elements[e].led) return;
+  if (system.friction_rows() == 0 || system.engine().elements[e].prescribed) return;
   if (!HasFriction(system.engine().mechanism->elements[e])) return;
   at->sliding = system.sliding().empty() ? 0 : system.sliding()[e];
   at->rests = at->sliding == 0;
@@ -303,7 +301,6 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
                        ", needs that drive's motion commanded: MuJoCo 2.2 has no inertia along a "
                        "tendon",
             .where = element.name,
-            .unit = {},
             .names_where = true};
   }
   return RunSummary::Done();
@@ -311,20 +308,20 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
 
 void FindLed(EngineModel* engine) {
   // A share of a coordinate that loops and commands leave open; less is round-off.
-  constexpr double kLed = 1e-9;
+  constexpr double kPrescribed = 1e-9;
   const DataHandle data = MakeData(*engine->m);
   ConstraintSystem system(*engine, data.get());
   system.SetTargets(VecX::Zero(static_cast<Eigen::Index>(engine->driven.size())));
   system.EvaluatePosition();
   Eigen::CompleteOrthogonalDecomposition<MatX> rows;
-  rows.setThreshold(kLed);
+  rows.setThreshold(kPrescribed);
   if (system.rows() > 0) rows.compute(system.ScaledJ().transpose());
   for (size_t e = 0; e < engine->elements.size(); ++e) {
     if (!HasFriction(engine->mechanism->elements[e])) continue;
     const VecX u = ElementGradient(system, e).cwiseProduct(system.dof_unit());
     VecX left = u;
     if (system.rows() > 0) left -= system.ScaledJ().transpose() * rows.solve(u);
-    engine->elements[e].led = left.norm() < kLed * u.norm();
+    engine->elements[e].prescribed = left.norm() < kPrescribed * u.norm();
   }
 }
 

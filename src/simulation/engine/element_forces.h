@@ -104,7 +104,7 @@ struct ElementSlope {
 /// Coulomb's; for all friction where drives are force-controlled in open loop.
 [[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion,
                                        DriveMode drives, bool own_events);
-/// Finds the elements that are led, at the model's reference pose.
+/// Finds the elements that are prescribed, at the model's reference pose.
 void FindLed(EngineModel* engine);
 
 /// True if there is something that MuJoCo lacks.

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "mechanism/joint_pose.h"
-#include "mechanism/reach.h"
 #include "simulation/mjcf/mjcf.h"
 
 namespace mbv::simulation {
@@ -56,7 +55,6 @@ RunSummary FindDriven(EngineModel* engine) {
                          "' acts on a coordinate of the ball or free joint '" +
                          mechanism.joints[driven->joint].name + "', which MuJoCo does not have",
               .where = drive.name,
-              .unit = {},
               .names_where = true};
     }
     add_joint(drive.name, equality, driven->joint, driven->coordinate);
@@ -85,7 +83,6 @@ RunSummary CheckCouplings(const Mechanism& mechanism) {
                                    "': it is neither linear nor one coordinate as a polynomial of "
                                    "one other; the other witnesses take it as it is",
             .where = coupling.name,
-            .unit = {},
             .names_where = true};
   }
   return RunSummary::Done();
@@ -164,7 +161,6 @@ RunSummary FindElements(EngineModel* engine) {
               .message = "element '" + element.name + "' acts on a coordinate of the free joint '" +
                          joint.name + "', which MuJoCo does not have",
               .where = element.name,
-              .unit = {},
               .names_where = true};
     }
     engine->elements.push_back(place);
@@ -237,7 +233,7 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   engine->mechanism = &mechanism;
   engine->plan = mjcf::MakePlan(mechanism);
   if (std::string trouble = mjcf::NestingTrouble(engine->plan); !trouble.empty()) {
-    return {.stop = Stop::kUnsupported, .message = std::move(trouble), .where = {}, .unit = {}};
+    return {.stop = Stop::kUnsupported, .message = std::move(trouble)};
   }
   engine->m = CompileMjcf(mjcf);
   engine->sparse = mj_isSparse(engine->m.get()) != 0;
@@ -299,7 +295,7 @@ void AddFrictionRows(EngineModel* engine) {
   for (int t = 0; t < m.ntendon; ++t) places.push_back({.tendon = t, .elements = {}});
   for (size_t e = 0; e < engine->elements.size(); ++e) {
     const ElementPlace& place = engine->elements[e];
-    if (place.led || !HasFriction(engine->mechanism->elements[e])) continue;
+    if (place.prescribed || !HasFriction(engine->mechanism->elements[e])) continue;
     const int at = place.tendon >= 0 ? m.nv + place.tendon : place.dof;
     const auto& law = std::get<FrictionLaw>(engine->mechanism->elements[e].law);
     // Without a loss there is no row; that by the load is written into it at every node.

@@ -37,7 +37,7 @@ struct ElementPlace {
   int turned = -1;        ///< MuJoCo's body that carries M, of a ball's friction about axes of M
                           ///< that are not MuJoCo's
   Vec3 axis_C = Vec3::Zero();  ///< there: M's axis on it, reversed where that body is inboard
-  bool led = false;  ///< commands move the coordinate, loops included, where others are free
+  bool prescribed = false;  ///< commands move the coordinate, loops included, where others are free
 };
 
 struct EngineModel;
@@ -109,7 +109,7 @@ void LeaveOutShapes(EngineModel* engine);
 void SetRestRates(double duration_s, EngineModel* engine);
 
 /// Gives MuJoCo rows of frictionloss where elements have dry friction on a coordinate that is not
-/// led, with the breakaway forces as losses. To be called before the data is made.
+/// prescribed, with the breakaway forces as losses. To be called before the data is made.
 void AddFrictionRows(EngineModel* engine);
 
 /// True if the motion of some drive is not prescribed.

@@ -8,10 +8,8 @@
 #include <numbers>
 
 #include "simulation/engine/element_forces.h"
-#include "simulation/engine/fastest_rate.h"
 #include "simulation/engine/integrator.h"
 #include "simulation/engine/session.h"
-#include "simulation/engine/steps.h"
 #include "simulation/mjcf/mjcf.h"
 #include "simulation/mjcf/plan.h"
 
@@ -104,7 +102,8 @@ StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command
     : s_(*session), integrator_(*integrator), command_(std::move(command)) {
   const std::vector<ForceElement>& elements = s_.engine.mechanism->elements;
   for (size_t e = 0; e < elements.size(); ++e) {
-    if (HasFriction(elements[e]) && !s_.engine.elements[e].led) friction_elements_.push_back(e);
+    if (HasFriction(elements[e]) && !s_.engine.elements[e].prescribed)
+      friction_elements_.push_back(e);
   }
   sliding_.assign(elements.size(), 0);
   fresh_.assign(elements.size(), 0);
@@ -184,9 +183,7 @@ RunSummary StickSlip::LetGo(double t_s) {
   }
   return {.stop = Stop::kNoConvergence,
           .message = "friction starts and stops again and again",
-          .time_s = t_s,
-          .where = {},
-          .unit = {}};
+          .time_s = t_s};
 }
 
 // (1)
@@ -358,8 +355,6 @@ RunSummary StickSlip::Advance(const Step& step) {
   return {.stop = Stop::kNoConvergence,
           .message = fmt::format("friction starts and stops again and again at t = {:.6g} s", from),
           .time_s = from,
-          .where = {},
-          .unit = {},
           .states_time = true};
 }
 
@@ -374,8 +369,6 @@ RunSummary Diverged(Session* s, const std::string& what, double t_s) {
   return {.stop = Stop::kEngineFailure,
           .message = fmt::format("{} at t = {:.6g} s", what, t_s),
           .time_s = t_s,
-          .where = {},
-          .unit = {},
           .states_time = true};
 }
 

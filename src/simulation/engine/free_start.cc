@@ -1,6 +1,5 @@
 // The start of a free motion: body states → MuJoCo's coordinates, then onto its own loops.
 #include <algorithm>
-#include <cmath>
 
 #include "kinematics/constraints.h"
 #include "kinematics/home.h"
@@ -130,9 +129,7 @@ RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
   if (start.X_WB.size() != s->engine.mechanism->bodies.size()) {
     return {.stop = Stop::kUnsupported,
             .message = "a free motion needs the states of all bodies at its start",
-            .time_s = 0.0,
-            .where = {},
-            .unit = {}};
+            .time_s = 0.0};
   }
   if (!Start(s->engine, s->motion, start, s->data.get()).Put()) {
     return {
@@ -140,9 +137,7 @@ RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
         .message =
             "a free joint between moving bodies, or a ball beside a hinge on its body, cannot be "
             "started",
-        .time_s = 0.0,
-        .where = {},
-        .unit = {}};
+        .time_s = 0.0};
   }
   if (RunSummary summary = s->solver.Close(first.position); !summary.ok()) {
     summary.time_s = 0.0;

@@ -4,10 +4,9 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <array>
 
+#include "simulation/engine/closure_solver.h"
 #include "simulation/engine/element_forces.h"
-#include "simulation/engine/sample_predictor.h"
 #include "simulation/engine/session.h"
 
 namespace mbv::simulation {
@@ -56,9 +55,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
   if (s->motion.free()) {
     return {.stop = Stop::kUnsupported,
             .message = "a motion that follows from forces needs mode: forward",
-            .time_s = 0.0,
-            .where = {},
-            .unit = {}};
+            .time_s = 0.0};
   }
   const std::vector<double>& times = s->run->trace.time_s;
   std::vector<DrivenSample> samples(times.size());
@@ -85,9 +82,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
                   "{} degrees of freedom are not driven: their motion follows from forces, "
                   "use mode: forward",
                   s->solver.undriven() - s->spins.count()),
-              .time_s = times[i],
-              .where = {},
-              .unit = {}};
+              .time_s = times[i]};
     }
     if (i == 0) {
       if (RunSummary summary = s->spins.TakeLeastTurns(&s->solver, samples[i]); !summary.ok()) {

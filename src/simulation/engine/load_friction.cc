@@ -64,8 +64,7 @@ LoadFriction::LoadFriction(Session* session) : s_(*session) {
                   .message =
                       "the loads of joints with friction by load are not found: they and "
                       "the friction raise each other",
-                  .where = ElementOf(s_, s_.loaded.front()).name,
-                  .unit = {}};
+                  .where = ElementOf(s_, s_.loaded.front()).name};
   }
   Apply();
 }
@@ -119,7 +118,6 @@ void LoadFriction::CheckUnique() {
                                Described(*s_.engine.mechanism, element) + " ('" + element.name +
                                "'): statics does not determine it",
                     .where = element.name,
-                    .unit = {},
                     .names_where = true};
     }
   }

@@ -86,7 +86,6 @@ RunSummary CheckLoadInputs(const EngineModel& engine, const Load& load) {
                          "' follows a coordinate that MuJoCo does not have; the other witnesses "
                          "take it as it is",
               .where = load.name,
-              .unit = {},
               .names_where = true};
     }
   }
@@ -150,7 +149,6 @@ RunSummary CheckLoads(const EngineModel& engine, const Motion& motion) {
             .message = "load '" + load.name + "' acts on the massless body '" +
                        engine.mechanism->bodies[load.body].name + "'",
             .where = load.name,
-            .unit = {},
             .names_where = true};
   }
   return RunSummary::Done();

@@ -75,7 +75,7 @@ struct OutputRates {
 [[nodiscard]] OutputRates OutputRatesOf(const EngineModel& engine, const mjData& d,
                                         const Output& output);
 
-/// Rate and acceleration of a joint's coordinate, which is none of a ball's.
+/// Rate and acceleration of a joint's coordinate, not of a spherical joint.
 struct CoordinateRates {
   double velocity = kNan, acceleration = kNan;
 };

@@ -1,8 +1,6 @@
 #include "simulation/engine/row_survey.h"
 
-#include "simulation/engine/loads.h"
 #include "simulation/engine/session.h"
-#include "simulation/engine/steps.h"
 #include "simulation/mjcf/mjcf.h"
 
 namespace mbv {
@@ -35,10 +33,9 @@ class RowSurveyor {
       if (RunSummary summary = driven(t_s, &at); !summary.ok()) return summary;
       RunSummary summary = s_.solver.Follow(from, at.position);
       if (summary.ok() && s_.solver.undriven() > s_.spins.count()) {
-        summary = {.stop = Stop::kUnsupported,
-                   .message = "degrees of freedom are not driven: their motion follows from forces",
-                   .where = {},
-                   .unit = {}};
+        summary = {
+            .stop = Stop::kUnsupported,
+            .message = "degrees of freedom are not driven: their motion follows from forces"};
       }
       summary.time_s = t_s;
       if (!summary.ok()) return summary;
@@ -122,8 +119,7 @@ RowSurvey SurveyRows(const Mechanism& mechanism, const Motion& motion, const Dri
   try {
     survey.summary = simulation::RunSurvey(mechanism, motion, driven, times_s, step_s, &survey);
   } catch (const simulation::EngineError& error) {
-    survey.summary = {
-        .stop = Stop::kEngineFailure, .message = error.what(), .where = {}, .unit = {}};
+    survey.summary = {.stop = Stop::kEngineFailure, .message = error.what()};
   }
   return survey;
 }

@@ -9,11 +9,31 @@
 #include "base/run_summary.h"
 #include "math/parallel_transport.h"
 #include "mechanism/idle_spins.h"
+#include "mechanism/motion.h"
 #include "simulation/engine/closure_solver.h"
 #include "simulation/engine/constraint_system.h"
 #include "simulation/engine/loads.h"
 #include "simulation/engine/recorder.h"
 #include "simulation/engine/simulation.h"
+
+// The time steps of a forward run: a uniform grid that carries the samples, and the times at which
+// a commanded profile changes its formula.
+
+namespace mbv::simulation {
+
+struct Step {
+  double from_s = 0.0, to_s = 0.0;
+  int uniform = 0;   ///< smooth uniform nodes before `to_s`, `from_s` included (at most 4): what a
+                     ///< multistep formula may use. 0 when the step itself is shorter.
+  long sample = -1;  ///< index of the sample at `to_s`, or -1
+};
+
+/// Steps of length `step_s`, adjusted so that samples fall on whole steps; a step is divided where
+/// some profile of the motion has a break.
+[[nodiscard]] std::vector<Step> MakeSteps(const Motion& motion, double step_s);
+
+/// The adjusted step [s].
+[[nodiscard]] double AdjustedStep(const Motion& motion, double step_s);
 
 // Idle spins (mechanism/idle_spins.h) in MuJoCo's coordinates. The constraints leave them open, and
 // least-norm solutions would turn them as the units of the coordinates happen to share: here each
@@ -28,8 +48,6 @@
 //   and as n·ω of ν is 1, these become zero by q̇ −= (n·ω) ν, q̈ −= (n·ε) ν. In inverse mode, where
 // nothing integrates, the lines are transported parallel from sample to sample
 // (math/parallel_transport.h); the first one takes the least turns from home.
-
-namespace mbv::simulation {
 
 class SpinStopper {
  public:
@@ -106,7 +124,7 @@ struct Session {
   [[nodiscard]] const VecX& WorkRates();
   /// Half-widths within which friction at rest leaves the forces of everything driven,
   /// Σ |∂(force)/∂(friction)| Fs: per element Jᵀλ = −u Fs, as forces are solved for.
-  /// Where drives are released MuJoCo finds what holds, but for coordinates that are led.
+  /// Where drives are released MuJoCo finds what holds, but for coordinates that are prescribed.
   [[nodiscard]] VecX Bands();
   /// True if forces depend on the accelerations and forces that MuJoCo finds.
   [[nodiscard]] bool follows() const { return released && (gyroscopic || !loaded.empty()); }
@@ -169,7 +187,7 @@ class LoopClock {
 
 /// Brings the system's data from home to the commanded start. Commands of outputs lead there by
 /// MuJoCo's own kinematics, those of drives by the drive positions; the loops are closed at the
-/// drive positions of `first`. A note says where the drive positions alone would have led
+/// drive positions of `first`. A note says where the drive positions alone would have gone
 /// elsewhere.
 [[nodiscard]] RunSummary CloseAtStart(const Motion& motion, const DrivenSample& first,
                                       ConstraintSystem* system, ClosureSolver* solver,
@@ -179,7 +197,7 @@ class LoopClock {
 [[nodiscard]] RunSummary FindCommandedStart(const Motion& motion, const DrivenSample& first,
                                             EngineModel* engine, EngineState* start,
                                             std::vector<std::string>* notes);
-/// Puts the session there, closed once more without the guides.
+/// Puts the session there, closed once more without the targets.
 [[nodiscard]] RunSummary PutAtCommandedStart(Session* session, const DrivenSample& first);
 
 /// Targets for MuJoCo's rows as they are. Of the stiffest impedance d and the time constant tc they

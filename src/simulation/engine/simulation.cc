@@ -10,7 +10,6 @@
 #include "simulation/engine/element_forces.h"
 #include "simulation/engine/load_friction.h"
 #include "simulation/engine/session.h"
-#include "simulation/engine/steps.h"
 #include "simulation/mjcf/mjcf.h"
 
 namespace mbv {
@@ -130,7 +129,7 @@ VecX Session::Bands() {
   VecX bands = VecX::Zero(driven);
   const VecX found = system.force();
   for (size_t e = 0; e < engine.elements.size(); ++e) {
-    if (released && !engine.elements[e].led) continue;
+    if (released && !engine.elements[e].prescribed) continue;
     const ElementMotion at = ElementMotionOf(system, e);
     const double most = BreakawayAt(engine.mechanism->elements[e], at);
     if (most == 0.0) continue;
@@ -306,8 +305,7 @@ Diagnostics Check(const SimulationOptions& options) {
   Diagnostics diagnostics;
   const auto require = [&](bool holds, const std::string& rule, double value) {
     if (!holds) {
-      diagnostics.Add(
-          {.file = {}, .message = fmt::format("{} violates {}", value, rule), .hint = {}});
+      diagnostics.Add({.message = fmt::format("{} violates {}", value, rule)});
     }
   };
   require(options.step_s > 0.0, "step_s > 0", options.step_s);
@@ -333,9 +331,7 @@ SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion, const D
       }
     } catch (const simulation::EngineError& error) {
       run.summary = {.stop = Stop::kEngineFailure,
-                     .message = std::string("MuJoCo: ") + error.what(),
-                     .where = {},
-                     .unit = {}};
+                     .message = std::string("MuJoCo: ") + error.what()};
     }
   }
   run.summary.wall_s =

@@ -612,7 +612,7 @@ bool AddSides(int e, Coupling* coupling, MjcfImport* in) {
 }
 
 void AddCoupling(int e, const std::string& name, MjcfImport* in) {
-  Coupling coupling{.name = name, .terms = {}};
+  Coupling coupling{.name = name};
   const mjModel& m = in->m;
   if (m.eq_type[e] == mjEQ_TENDON && m.eq_obj2id[e] < 0 &&
       in->driven_tendons.contains(m.eq_obj1id[e])) {

@@ -1,4 +1,4 @@
-#include "simulation/mjcf/foreign_attach.h"
+#include "simulation/mjcf/foreign_frames.h"
 
 #include <fmt/format.h>
 #include <algorithm>

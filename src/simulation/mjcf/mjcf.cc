@@ -456,7 +456,7 @@ void WriteDefaults(const Sections& s) {
   s.xml->Close();
 }
 
-// From so many DOFs on, MuJoCo's sparse constraint solver is faster.
+// From this many DOFs on, MuJoCo's sparse constraint solver is faster.
 constexpr int kSparseFrom = 40;
 
 int DofsOfTree(const Mechanism& mechanism) {

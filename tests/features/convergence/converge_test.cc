@@ -1,6 +1,5 @@
 // The orders of the schemes, seen on shipped scenarios.
 #include "features/convergence/converge.h"
-#include "features/convergence/convergence_report.h"
 #include "tests/support/source_dir.h"
 
 #include <gtest/gtest.h>

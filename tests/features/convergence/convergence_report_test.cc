@@ -1,4 +1,4 @@
-#include "features/convergence/convergence_report.h"
+#include "features/convergence/converge.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Rows in two versions: which changes are known, and that any other is called unexplained.
-#include "features/engines/upgrade.h"
+#include "features/engines/crosscheck.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What another version changes: the text and the JSON of it.
-#include "features/engines/upgrade.h"
+#include "features/engines/crosscheck.h"
 
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ TEST(UpgradeReport, IsReadByPeople) {
       "  recipe                         3.0e-04       –      1.0e-05 m    –  diverged\n");
 }
 
-TEST(UpgradeReport, ReportsWhatIsReportedAndThatNobodyAnswered) {
+TEST(UpgradeReport, ReportsMessagesAndThatNoAnswerCame) {
   UpgradeReport report = ExampleUpgrade();
   report.messages = {"a word"};
   EXPECT_NE(ToText(report).find("  says while loading:\n    a word\n"), std::string::npos);

@@ -1,5 +1,5 @@
 // The audit of a file's equations: what is right, nearly right and wrong, and the usual slips.
-#include "features/equation_audit/file_audit.h"
+#include "features/equation_audit/audit.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -252,7 +252,7 @@ TEST(FileAudit, RefusesWhatItCannotUnderstand) {
            {"from mbverify.equations import *\nstates('four_bar', coordinates=['motor'], "
             "ranges={'x': [1, 2]})\n" +
                 good,
-            "'x' is none of the coordinates"},
+            "'x' is not one of the coordinates"},
        }) {
     const Audited audited = Audit("e.py", wrong.text);
     EXPECT_FALSE(audited.table) << wrong.text;

@@ -1,5 +1,5 @@
 // How residuals are collected and written.
-#include "features/equation_audit/row_meter.h"
+#include "features/equation_audit/audit.h"
 
 #include <gtest/gtest.h>
 

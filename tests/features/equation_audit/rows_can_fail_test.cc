@@ -53,50 +53,51 @@ class Noticed {
   std::set<std::string> insensitive_;
 };
 
-constexpr double kBendOfAll = 1 + 1e-6;
+constexpr double kPerturbationOfAll = 1 + 1e-6;
 
 TEST(AuditRows, OfTheScaraRobotCanFail) {
   const LoadResult model = LoadModel(kModelsOfAudits + "/scara_robot/model.yaml");
   const Mechanism& robot = *model.mechanism;
   const auto sweep = scara_audit::Sweep(robot);
-  const auto rows = [&](const scara::Parameters& p, const std::vector<scara_audit::State>& states) {
+  const auto rows = [&](const scara_robot::Parameters& p,
+                        const std::vector<scara_audit::State>& states) {
     return All({scara_audit::PositionRows(robot, p, states), scara_audit::VelocityRows(p, states),
                 scara_audit::LinkRows(p, states), scara_audit::DynamicsRows(p, states)});
   };
-  const scara::Parameters right = scara::ParametersOf(robot);
+  const scara_robot::Parameters right = scara_robot::ParametersOf(robot);
   Noticed noticed(rows(right, sweep));
-  using P = scara::Parameters;
+  using P = scara_robot::Parameters;
   for (double P::*member : {&P::R, &P::r, &P::l1, &P::l2, &P::l3, &P::e, &P::m_p, &P::I_pz,
                             &P::m_arm, &P::arm_radius, &P::arm_com, &P::m_rods, &P::rod_radius}) {
     P perturbed = right;
-    perturbed.*member *= kBendOfAll;
+    perturbed.*member *= kPerturbationOfAll;
     noticed.Perturbed(rows(perturbed, sweep));
   }
   using State = scara_audit::State;
-  const std::vector<std::function<void(State*)>> bends = {
-      [](State* s) { s->theta *= kBendOfAll; },
-      [](State* s) { s->rates.dX *= kBendOfAll; },
-      [](State* s) { s->rates.ddX *= kBendOfAll; },
-      [](State* s) { s->rates.dtheta *= kBendOfAll; },
-      [](State* s) { s->rates.ddtheta *= kBendOfAll; },
-      [](State* s) { s->M *= kBendOfAll; },
-      [](State* s) { s->P.v *= kBendOfAll; },
-      [](State* s) { s->P.a *= kBendOfAll; },
-      [](State* s) { s->domega_platform *= kBendOfAll; },
+  const std::vector<std::function<void(State*)>> perturbations = {
+      [](State* s) { s->theta *= kPerturbationOfAll; },
+      [](State* s) { s->rates.dX *= kPerturbationOfAll; },
+      [](State* s) { s->rates.ddX *= kPerturbationOfAll; },
+      [](State* s) { s->rates.dtheta *= kPerturbationOfAll; },
+      [](State* s) { s->rates.ddtheta *= kPerturbationOfAll; },
+      [](State* s) { s->M *= kPerturbationOfAll; },
+      [](State* s) { s->P.v *= kPerturbationOfAll; },
+      [](State* s) { s->P.a *= kPerturbationOfAll; },
+      [](State* s) { s->domega_platform *= kPerturbationOfAll; },
       [](State* s) { s->tilt += 1e-6; },
-      [](State* s) { s->limbs[1].arm.a *= kBendOfAll; },
-      [](State* s) { s->limbs[1].rods.v *= kBendOfAll; },
-      [](State* s) { s->limbs[1].rods.a *= kBendOfAll; },
-      [](State* s) { s->limbs[1].omega_arm *= kBendOfAll; },
-      [](State* s) { s->limbs[1].domega_arm *= kBendOfAll; },
-      [](State* s) { s->limbs[1].omega_rod *= kBendOfAll; },
-      [](State* s) { s->limbs[1].domega_rod *= kBendOfAll; },
+      [](State* s) { s->limbs[1].arm.a *= kPerturbationOfAll; },
+      [](State* s) { s->limbs[1].rods.v *= kPerturbationOfAll; },
+      [](State* s) { s->limbs[1].rods.a *= kPerturbationOfAll; },
+      [](State* s) { s->limbs[1].omega_arm *= kPerturbationOfAll; },
+      [](State* s) { s->limbs[1].domega_arm *= kPerturbationOfAll; },
+      [](State* s) { s->limbs[1].omega_rod *= kPerturbationOfAll; },
+      [](State* s) { s->limbs[1].domega_rod *= kPerturbationOfAll; },
       [](State* s) { s->limbs[1].rods_apart += 1e-6; },
-      [](State* s) { s->J *= kBendOfAll; },
-      [](State* s) { s->J_inverse *= kBendOfAll; }};
-  for (const auto& bend : bends) {
+      [](State* s) { s->J *= kPerturbationOfAll; },
+      [](State* s) { s->J_inverse *= kPerturbationOfAll; }};
+  for (const auto& perturb : perturbations) {
     auto states = sweep;
-    bend(&states[5]);
+    perturb(&states[5]);
     noticed.Perturbed(rows(right, states));
   }
   // The topology, printed data and figures; (33) and (49) hold for any constants.
@@ -106,22 +107,23 @@ TEST(AuditRows, OfTheScaraRobotCanFail) {
 }
 
 TEST(AuditRows, OfTheScaraRobotsStiffnessCanFail) {
-  const auto rows = [](const scara::StiffnessParameters& p) {
+  const auto rows = [](const scara_robot::StiffnessParameters& p) {
     return scara_audit::StiffnessRows(kModelsOfAudits, p);
   };
-  const auto right =
-      scara::StiffnessParametersOf(stiffness_audit::LoadElastic(kModelsOfAudits, "scara_robot"));
+  const auto right = scara_robot::StiffnessParametersOf(
+      stiffness_audit::LoadElastic(kModelsOfAudits, "scara_robot"));
   Noticed noticed(rows(right));
-  using P = scara::StiffnessParameters;
+  using P = scara_robot::StiffnessParameters;
   for (double P::*member : {&P::d, &P::E, &P::G, &P::diameter, &P::K_act}) {
     P perturbed = right;
-    perturbed.*member *= kBendOfAll;
+    perturbed.*member *= kPerturbationOfAll;
     noticed.Perturbed(rows(perturbed));
   }
-  for (double scara::Parameters::*member : {&scara::Parameters::l1, &scara::Parameters::l2,
-                                            &scara::Parameters::r, &scara::Parameters::e}) {
+  for (double scara_robot::Parameters::*member :
+       {&scara_robot::Parameters::l1, &scara_robot::Parameters::l2, &scara_robot::Parameters::r,
+        &scara_robot::Parameters::e}) {
     P perturbed = right;
-    perturbed.geometry.*member *= kBendOfAll;
+    perturbed.geometry.*member *= kPerturbationOfAll;
     noticed.Perturbed(rows(perturbed));
   }
   EXPECT_EQ(noticed.insensitive(), std::set<std::string>{});
@@ -150,7 +152,7 @@ TEST(AuditRows, OfTheCabinRobotCanFail) {
     if (!parameter.name.starts_with("m_") && !parameter.name.starts_with("I_")) continue;
     Mechanism perturbed = robot;
     for (Parameter& p : perturbed.parameters) {
-      if (p.name == parameter.name) p.value *= kBendOfAll;
+      if (p.name == parameter.name) p.value *= kPerturbationOfAll;
     }
     noticed.Perturbed(cabin_audit::DynamicsRows(perturbed, robot));
   }
@@ -168,23 +170,23 @@ TEST(AuditRows, OfTheCabinRobotCanFail) {
 }
 
 TEST(AuditRows, OfTheCabinRobotsStiffnessCanFail) {
-  const auto rows = [](const cabin::StiffnessParameters& p) {
+  const auto rows = [](const cabin_robot::StiffnessParameters& p) {
     return cabin_audit::StiffnessRows(kModelsOfAudits, p);
   };
-  const auto right =
-      cabin::StiffnessParametersOf(stiffness_audit::LoadElastic(kModelsOfAudits, "cabin_robot"));
+  const auto right = cabin_robot::StiffnessParametersOf(
+      stiffness_audit::LoadElastic(kModelsOfAudits, "cabin_robot"));
   Noticed noticed(rows(right));
-  const std::vector<std::function<void(cabin::StiffnessParameters*)>> bends = {
-      [](auto* p) { p->E *= kBendOfAll; },
-      [](auto* p) { p->G *= kBendOfAll; },
-      [](auto* p) { p->w *= kBendOfAll; },
-      [](auto* p) { p->wrist.a3 *= kBendOfAll; },
-      [](auto* p) { p->sections[cabin::kBeamEF].h *= kBendOfAll; },
-      [](auto* p) { p->sections[cabin::kBeamCD].b *= kBendOfAll; },
-      [](auto* p) { p->sections[cabin::kBeamAB].b *= kBendOfAll; }};
-  for (const auto& bend : bends) {
-    cabin::StiffnessParameters perturbed = right;
-    bend(&perturbed);
+  const std::vector<std::function<void(cabin_robot::StiffnessParameters*)>> perturbations = {
+      [](auto* p) { p->E *= kPerturbationOfAll; },
+      [](auto* p) { p->G *= kPerturbationOfAll; },
+      [](auto* p) { p->w *= kPerturbationOfAll; },
+      [](auto* p) { p->wrist.a3 *= kPerturbationOfAll; },
+      [](auto* p) { p->sections[cabin_robot::kBeamEF].h *= kPerturbationOfAll; },
+      [](auto* p) { p->sections[cabin_robot::kBeamCD].b *= kPerturbationOfAll; },
+      [](auto* p) { p->sections[cabin_robot::kBeamAB].b *= kPerturbationOfAll; }};
+  for (const auto& perturb : perturbations) {
+    cabin_robot::StiffnessParameters perturbed = right;
+    perturb(&perturbed);
     noticed.Perturbed(rows(perturbed));
   }
   EXPECT_EQ(noticed.insensitive(), std::set<std::string>{"(55)"});  // equilibrium by angles
@@ -197,30 +199,30 @@ TEST(AuditRows, OfTheTripodCanFail) {
     return All({PositionRows(c), VelocityRows(c), PathRows(c), DynamicsRows(c)});
   };
   Noticed noticed(rows(right));
-  const std::vector<std::function<void(Case*)>> bends = {
-      [](Case* c) { c->geometry.a *= kBendOfAll; },
-      [](Case* c) { c->geometry.b *= kBendOfAll; },
-      [](Case* c) { c->truth[3].r.x() *= kBendOfAll; },
-      [](Case* c) { c->truth[3].v *= kBendOfAll; },
-      [](Case* c) { c->truth[3].v_dot *= kBendOfAll; },
-      [](Case* c) { c->truth[3].omega *= kBendOfAll; },
-      [](Case* c) { c->truth[3].omega_dot *= kBendOfAll; },
-      [](Case* c) { c->truth[3].psi *= kBendOfAll; },
-      [](Case* c) { c->truth[3].theta *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].q *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].q_dot *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].q_ddot *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].f *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].S *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].v_A *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].omega *= kBendOfAll; },
-      [](Case* c) { c->truth[3].leg[1].omega_dot *= kBendOfAll; },
+  const std::vector<std::function<void(Case*)>> perturbations = {
+      [](Case* c) { c->geometry.a *= kPerturbationOfAll; },
+      [](Case* c) { c->geometry.b *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].r.x() *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].v *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].v_dot *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].omega *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].omega_dot *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].psi *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].theta *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].q *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].q_dot *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].q_ddot *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].f *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].S *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].v_A *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].omega *= kPerturbationOfAll; },
+      [](Case* c) { c->truth[3].leg[1].omega_dot *= kPerturbationOfAll; },
       [](Case* c) { c->truth[3].leg[1].w += Vec3(0, 1e-6, 0); },
       [](Case* c) { c->truth[3].leg[1].c += Vec3(0, 1e-6, 0); },
       [](Case* c) { c->truth[3].leg[1].A += Vec3(1e-6, 0, 0); }};
-  for (const auto& bend : bends) {
+  for (const auto& perturb : perturbations) {
     Case perturbed = right;
-    bend(&perturbed);
+    perturb(&perturbed);
     noticed.Perturbed(rows(perturbed));
   }
   // The path law, the example's data, and identities in the angles.
@@ -236,42 +238,42 @@ TEST(AuditRows, OfTheStabilizingPlatformCanFail) {
     return All({PoseRows(a), TwistRows(a), LimbRows(a), ForceRows(a, b), ClaimRows(a, b)});
   };
   Noticed noticed(rows(full, massless));
-  const auto bend = [&](const std::function<void(Truth*)>& change) {
+  const auto perturb = [&](const std::function<void(Truth*)>& change) {
     Case bent_full = full, bent_massless = massless;
     change(&bent_full.truth[7]);
     change(&bent_massless.truth[7]);
     noticed.Perturbed(rows(bent_full, bent_massless));
   };
-  bend([](Truth* t) { t->X_eo.translation() *= kBendOfAll; });
-  bend([](Truth* t) { t->X_ep.translation() *= kBendOfAll; });
-  bend([](Truth* t) { t->X_ep.linear() *= Eigen::AngleAxisd(1e-6, Vec3::UnitZ()).matrix(); });
-  bend([](Truth* t) { t->motion_o *= kBendOfAll; });
-  bend([](Truth* t) { t->motion_p *= kBendOfAll; });
-  bend([](Truth* t) { t->acceleration_o *= kBendOfAll; });
-  bend([](Truth* t) { t->acceleration_p *= kBendOfAll; });
-  bend([](Truth* t) { t->V_eo *= kBendOfAll; });
-  bend([](Truth* t) { t->V_ep *= kBendOfAll; });
-  bend([](Truth* t) { t->A_eo *= kBendOfAll; });
-  bend([](Truth* t) { t->A_ep *= kBendOfAll; });
-  bend([](Truth* t) { t->V_op *= kBendOfAll; });
-  bend([](Truth* t) { t->A_op *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].p_oA *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].p_oB *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].l *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].l_rate *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].l_acceleration *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].tilt += 1e-6; });
-  bend([](Truth* t) { t->limbs[1].tilt_rate *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].side[1].q1 *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].side[1].q2 *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].side[1].q1_rate *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].side[1].q2_rate *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].side[1].R.value *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].side[1].R.rate *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].side[1].elbow_A *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].link_twist_A[2] *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].force_A *= kBendOfAll; });
-  bend([](Truth* t) { t->limbs[1].drive[1] *= kBendOfAll; });
+  perturb([](Truth* t) { t->X_eo.translation() *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->X_ep.translation() *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->X_ep.linear() *= Eigen::AngleAxisd(1e-6, Vec3::UnitZ()).matrix(); });
+  perturb([](Truth* t) { t->motion_o *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->motion_p *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->acceleration_o *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->acceleration_p *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->V_eo *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->V_ep *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->A_eo *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->A_ep *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->V_op *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->A_op *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].p_oA *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].p_oB *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].l *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].l_rate *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].l_acceleration *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].tilt += 1e-6; });
+  perturb([](Truth* t) { t->limbs[1].tilt_rate *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].side[1].q1 *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].side[1].q2 *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].side[1].q1_rate *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].side[1].q2_rate *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].side[1].R.value *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].side[1].R.rate *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].side[1].elbow_A *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].link_twist_A[2] *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].force_A *= kPerturbationOfAll; });
+  perturb([](Truth* t) { t->limbs[1].drive[1] *= kPerturbationOfAll; });
   // Counts of equations, claims about the design, and limits at 0/0.
   EXPECT_EQ(noticed.insensitive(),
             (std::set<std::string>{"(16) φ''", "(4)", "30 equations, rank",

@@ -77,8 +77,8 @@ TEST(ScaraAudit, PerturbedConstantsLeaveEquationsUnconfirmed) {
   const LoadResult model = LoadModel(std::string(kModelFolder) + "/scara_robot/model.yaml");
   ASSERT_TRUE(model.mechanism) << model.diagnostics.Text();
   const std::vector<scara_audit::State> states = scara_audit::Sweep(*model.mechanism);
-  const auto unconfirmed = [&](double scara::Parameters::*member) {
-    scara::Parameters perturbed = scara::ParametersOf(*model.mechanism);
+  const auto unconfirmed = [&](double scara_robot::Parameters::*member) {
+    scara_robot::Parameters perturbed = scara_robot::ParametersOf(*model.mechanism);
     perturbed.*member *= 1.0 + 1e-8;
     std::set<std::string> equations;
     for (const auto& rows : {PositionRows(*model.mechanism, perturbed, states),
@@ -89,12 +89,12 @@ TEST(ScaraAudit, PerturbedConstantsLeaveEquationsUnconfirmed) {
     }
     return equations;
   };
-  EXPECT_TRUE(unconfirmed(&scara::Parameters::l3).contains("(6)"));
-  EXPECT_TRUE(unconfirmed(&scara::Parameters::e).contains("(3), (5)"));
-  EXPECT_TRUE(unconfirmed(&scara::Parameters::m_p).contains("(48)"));
-  EXPECT_TRUE(unconfirmed(&scara::Parameters::m_rods).contains("(48)"));
-  EXPECT_TRUE(unconfirmed(&scara::Parameters::I_pz).contains("(48)"));
-  EXPECT_TRUE(unconfirmed(&scara::Parameters::l1).contains("(31) v_i1"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::Parameters::l3).contains("(6)"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::Parameters::e).contains("(3), (5)"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::Parameters::m_p).contains("(48)"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::Parameters::m_rods).contains("(48)"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::Parameters::I_pz).contains("(48)"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::Parameters::l1).contains("(31) v_i1"));
 }
 
 }  // namespace

@@ -24,11 +24,11 @@ std::set<std::string> With(const std::vector<AuditRow>& rows, AuditVerdict verdi
   return equations;
 }
 
-cabin::StiffnessParameters Cabin() {
-  return cabin::StiffnessParametersOf(stiffness_audit::LoadElastic(kModels, "cabin_robot"));
+cabin_robot::StiffnessParameters Cabin() {
+  return cabin_robot::StiffnessParametersOf(stiffness_audit::LoadElastic(kModels, "cabin_robot"));
 }
-scara::StiffnessParameters Scara() {
-  return scara::StiffnessParametersOf(stiffness_audit::LoadElastic(kModels, "scara_robot"));
+scara_robot::StiffnessParameters Scara() {
+  return scara_robot::StiffnessParametersOf(stiffness_audit::LoadElastic(kModels, "scara_robot"));
 }
 
 TEST(StiffnessAudit, CabinsEquationsAreRightOrMended) {
@@ -44,17 +44,17 @@ TEST(StiffnessAudit, CabinsEquationsAreRightOrMended) {
 }
 
 TEST(StiffnessAudit, CabinsPerturbedConstantsLeaveEquationsUnconfirmed) {
-  const auto unconfirmed = [](const auto& bend) {
-    cabin::StiffnessParameters p = Cabin();
-    bend(&p);
+  const auto unconfirmed = [](const auto& perturb) {
+    cabin_robot::StiffnessParameters p = Cabin();
+    perturb(&p);
     return With(cabin_audit::StiffnessRows(kModels, p), AuditVerdict::kWrongAndUnfixed);
   };
   constexpr double kBend = 1 + 1e-8;
-  const auto strut = unconfirmed([](auto* p) { p->sections[cabin::kBeamEF].h *= kBend; });
+  const auto strut = unconfirmed([](auto* p) { p->sections[cabin_robot::kBeamEF].h *= kBend; });
   EXPECT_TRUE(strut.contains("(56)–(61)"));
   EXPECT_TRUE(strut.contains("(65) K_AB"));
   EXPECT_FALSE(strut.contains("(65) K_CD"));
-  const auto link = unconfirmed([](auto* p) { p->sections[cabin::kBeamCD].b *= kBend; });
+  const auto link = unconfirmed([](auto* p) { p->sections[cabin_robot::kBeamCD].b *= kBend; });
   EXPECT_TRUE(link.contains("(65) K_CD"));
   EXPECT_TRUE(link.contains("(62)–(64), (66)–(68)"));
   EXPECT_TRUE(unconfirmed([](auto* p) { p->w *= kBend; }).contains("(62)–(64), (66)–(68)"));
@@ -63,18 +63,18 @@ TEST(StiffnessAudit, CabinsPerturbedConstantsLeaveEquationsUnconfirmed) {
 }
 
 TEST(StiffnessAudit, ScarasPerturbedConstantsLeaveEquationsUnconfirmed) {
-  const auto unconfirmed = [](double scara::StiffnessParameters::*member) {
-    scara::StiffnessParameters p = Scara();
+  const auto unconfirmed = [](double scara_robot::StiffnessParameters::*member) {
+    scara_robot::StiffnessParameters p = Scara();
     p.*member *= 1 + 1e-8;
     return With(scara_audit::StiffnessRows(kModels, p), AuditVerdict::kWrongAndUnfixed);
   };
-  const auto servo = unconfirmed(&scara::StiffnessParameters::K_act);
+  const auto servo = unconfirmed(&scara_robot::StiffnessParameters::K_act);
   EXPECT_TRUE(servo.contains("(15)"));
   EXPECT_TRUE(servo.contains("(18), (21) κ_m"));
   EXPECT_FALSE(servo.contains("(12)"));
   EXPECT_FALSE(servo.contains("K_D1"));
-  EXPECT_TRUE(unconfirmed(&scara::StiffnessParameters::E).contains("(12)"));
-  EXPECT_TRUE(unconfirmed(&scara::StiffnessParameters::d).contains("K_D1"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::StiffnessParameters::E).contains("(12)"));
+  EXPECT_TRUE(unconfirmed(&scara_robot::StiffnessParameters::d).contains("K_D1"));
 }
 
 }  // namespace

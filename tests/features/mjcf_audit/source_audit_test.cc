@@ -7,7 +7,7 @@
 #include "base/files.h"
 #include "features/mjcf_audit/source_audit.h"
 #include "features/run/default_setup.h"
-#include "simulation/mjcf/closure_settings.h"
+#include "simulation/mjcf/foreign.h"
 #include "tests/support/test_folder.h"
 
 namespace mbv {
@@ -163,7 +163,7 @@ TEST_F(SourceModelAudits, ServosThatLagAreNamedAndNoSettingIsBlamed) {
       {.head = kStiff,
        .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"}));
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
-  EXPECT_TRUE(Reported(audit.done, "m: led by the file's own position servos"));
+  EXPECT_TRUE(Reported(audit.done, "m: driven by the file's own position servos"));
   EXPECT_GT(audit.as_is.force, 0.01);
   EXPECT_EQ(Named(audit), Keys{"drives"});
   EXPECT_FALSE(audit.searched);
@@ -201,7 +201,7 @@ TEST_F(SourceModelAudits, AnEqualityThatHoldsTheDriveLeadsIt) {
   bars.closure += holds;
   const SourceModelAudit audit = Audit(Text(bars));
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
-  EXPECT_TRUE(Reported(audit.done, "m: led by the file's own equality"));
+  EXPECT_TRUE(Reported(audit.done, "m: driven by the file's own equality"));
   EXPECT_NE(Find(audit, "drives"), nullptr);
   EXPECT_LT(audit.corrected.force, 1e-3);
 }

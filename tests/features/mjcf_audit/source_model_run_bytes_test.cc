@@ -1,5 +1,5 @@
 // Runs of a user's file on their way out of a child process.
-#include "features/mjcf_audit/source_model_run_bytes.h"
+#include "features/mjcf_audit/source_audit.h"
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ SourceModelRun ExampleRun() {
                  .states_time = true};
   run.facts.step_s = 0.002;
   run.facts.closures = {"C", ""};
-  run.facts.leads = {DriveLead::kServo, DriveLead::kAdded};
+  run.facts.held_by = {DriveHold::kServo, DriveHold::kAdded};
   run.facts.rough_solver = true;
   run.trace.Reset({0.0, 0.01}, {MakeChannel(Quantity::kForce, "N m", "m")});
   run.trace.values << 1.5, kNan;
@@ -31,7 +31,7 @@ SourceModelRun ExampleRun() {
   return run;
 }
 
-TEST(OwnRunBytes, ComeBackAsTheyWere) {
+TEST(SourceModelRunBytes, ComeBackAsTheyWere) {
   const SourceModelRun run = ExampleRun();
   const auto back = FromBytes<SourceModelRun>(ToBytes(run));
   ASSERT_TRUE(back);
@@ -45,7 +45,7 @@ TEST(OwnRunBytes, ComeBackAsTheyWere) {
   EXPECT_TRUE(back->summary.names_where);
   EXPECT_TRUE(back->summary.states_time);
   EXPECT_EQ(back->facts.closures, run.facts.closures);
-  EXPECT_EQ(back->facts.leads, run.facts.leads);
+  EXPECT_EQ(back->facts.held_by, run.facts.held_by);
   EXPECT_TRUE(back->facts.rough_solver);
   EXPECT_EQ(back->trace.time_s, run.trace.time_s);
   EXPECT_EQ(back->trace.channels[0].name, "m.force");
@@ -57,7 +57,7 @@ TEST(OwnRunBytes, ComeBackAsTheyWere) {
 }
 
 // A child that dies while it writes, or writes too much.
-TEST(OwnRunBytes, PartsAreNoRun) {
+TEST(SourceModelRunBytes, PartsAreNoRun) {
   const std::string bytes = ToBytes(ExampleRun());
   for (size_t size = 0; size < bytes.size(); ++size) {
     EXPECT_FALSE(FromBytes<SourceModelRun>(bytes.substr(0, size))) << size;

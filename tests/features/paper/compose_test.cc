@@ -1,4 +1,4 @@
-#include "features/paper/compose.h"
+#include "features/paper/figures.h"
 
 #include <gmock/gmock.h>
 
@@ -110,7 +110,7 @@ TEST(ComposeFigures, ASignalMayStandOverAnother) {
   EXPECT_DOUBLE_EQ(panel.curves[0].points[9].second, trace.values(9, trace.Find("d1.force")));
 }
 
-TEST(ComposeFigures, WhatNobodyRecordedIsLeftOutAndTold) {
+TEST(ComposeFigures, WhatNoWitnessRecordedIsLeftOutAndReported) {
   const FigureSet set = Composed(
       {.signals = {{"plate.x.velocity", "figures[0].signals"}}, .witnesses = {{"analytic"}}});
   EXPECT_TRUE(set.figures.empty());

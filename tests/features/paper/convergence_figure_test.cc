@@ -1,6 +1,6 @@
 // Errors against the step: every error stands where it was measured, and lines have the fitted
 // slope.
-#include "features/paper/from_plot.h"
+#include "features/paper/figures.h"
 
 #include <gmock/gmock.h>
 

@@ -1,8 +1,7 @@
-#include "features/paper/default_figures.h"
+#include "features/paper/figures.h"
 
 #include <gmock/gmock.h>
 
-#include "features/paper/from_plot.h"
 #include "tests/support/read_back.h"
 
 namespace mbv {

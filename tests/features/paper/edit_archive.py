@@ -1,4 +1,4 @@
-"""Edits an archive of `mbverify package` as somebody might who sends it on.
+"""Edits an archive of `mbverify package` as a third party might who forwards it.
 
 edit_archive.py IN OUT WORDS…, where WORDS are any of
   replace PATH OLD NEW   the first OLD in a file; PATH in the archive's folder

@@ -1,5 +1,5 @@
-// The commands package and verify: an archive runs wherever it is unpacked, and whatever somebody
-// changes in it is reported.
+// The commands package and verify: an archive runs wherever it is unpacked, and whatever a third
+// party changes in it is reported.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -70,7 +70,7 @@ TEST(PackageCommand, TheSameInputsGiveTheSameBytes) {
       << verified.out;
 }
 
-TEST(PackageCommand, RunsAsItIsUnpackedAndNamesNobody) {
+TEST(PackageCommand, RunsAsItIsUnpackedAndContainsNoUserPath) {
   const Program mbverify("package_home");
   const std::string home = (mbverify.folder() / "home/jane_doe").string();
   const std::string copied = "mkdir -p " + home + "/papers/mine " + home +

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "features/paper/rerun_judge.h"
+#include "features/paper/packed_run.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_folder.h"
 

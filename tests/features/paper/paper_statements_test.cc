@@ -1,4 +1,4 @@
-#include "features/paper/paper_statements.h"
+#include "features/paper/paper_figures.h"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // A result against its repetition: round-off passes, a perturbed number is reported.
-#include "features/paper/rerun.h"
+#include "features/paper/rerun_report.h"
 
 #include <gtest/gtest.h>
 

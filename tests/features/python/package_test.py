@@ -336,7 +336,7 @@ class Commands(unittest.TestCase):
 
     def test_a_workspace_is_the_programs(self):
         result = mbverify.workspace(
-            "rubbing_five_bar", {"x_mm": (-200, 200), "y_mm": (150, 500)}, resolution=40, jobs=2
+            "friction_five_bar", {"x_mm": (-200, 200), "y_mm": (150, 500)}, resolution=40, jobs=2
         )
         self.assertTrue(result.agrees)
         self.assertEqual(result.coordinates, ["tool.x", "tool.y"])

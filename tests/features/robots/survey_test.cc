@@ -189,8 +189,9 @@ TEST(DefaultSetup, WhereOnlySpinsOfRodsAreLeftOneBallHoldsEach) {
   const Mechanism& m = made.setup->mechanism;
   EXPECT_EQ(AnalyseMobility(m).undriven, 0);
   EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("B"))].kind, JointKind::kUniversal);
-  EXPECT_NE(made.setup->model.find("the free spin of rod about the line between its balls is left "
-                                   "out"),
+  EXPECT_NE(made.setup->model.find(
+                "the free spin of rod about the line between its spherical joints is left "
+                "out"),
             std::string::npos)
       << made.setup->model;
   const SurveyRow row = SurveyFile(file, folder.PathOf("scratch"));

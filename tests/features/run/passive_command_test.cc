@@ -155,7 +155,7 @@ TEST_F(PassiveCommand, FindingsSayWhatCanBeCommandedAndHowMany) {
       {"{ankle.0: 0}", "for instance command also left\n"},
       {"{left: 0, right: 0, ankle.0: 0}", "ankle.0 are dependent\n"},
       {"{ankle: 0, left: 0}", "this joint has several coordinates: ankle.0, ankle.1"},
-      {"{left_top.1: 0, left: 0}", "a rotation of a ball has no axis"},
+      {"{left_top.1: 0, left: 0}", "a rotation of a spherical joint has no axis"},
       {"{knee: 0, left: 0}", "any 2 independent ones can be commanded"},
   };
   for (const auto& [commands, part] : cases) {

@@ -241,7 +241,7 @@ TEST(VerdictCaveats, ATableOfAnotherGravityAgreesButNotWithoutAWord) {
   const std::string said = GravityDoubtOf(9.80665, 1.0, &verdict);
   EXPECT_EQ(verdict, Verdict::kAgree);
   EXPECT_TRUE(Has(said, "fit g = 9.80665 m/s² better than the model's 9.81")) << said;
-  // The same g raises no doubt, nor does a mass that is wrong by as much.
+  // The same g raises no warning, nor does a mass that is wrong by as much.
   EXPECT_EQ(GravityDoubtOf(9.81, 1.0, &verdict), "");
   EXPECT_EQ(GravityDoubtOf(9.81, 9.80665 / 9.81, &verdict), "");
 }

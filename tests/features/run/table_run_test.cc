@@ -157,7 +157,8 @@ TEST(TableRun, FilesHoldTheTableItsTubeAndItsGaps) {
   std::filesystem::remove_all(out);
 }
 
-// A smooth motion as encoders and planners print it: so many decimals of a degree or a millimetre.
+// A smooth motion as encoders and planners print it: this many decimals of a degree or a
+// millimetre.
 struct Printed {
   const char* scenario;
   std::vector<std::pair<const char*, const char*>> commands;  // name, and what is added

@@ -9,7 +9,6 @@
 
 #include "base/files.h"
 #include "features/standin/standin.h"
-#include "features/standin/standin_report.h"
 #include "model_file/load_model.h"
 #include "reference/reduced_model.h"
 #include "scenario/find_model.h"

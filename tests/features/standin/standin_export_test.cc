@@ -1,5 +1,5 @@
 // What replaces a loop: serial model and code together against the full loop, and files read back.
-#include "features/standin/standin_export.h"
+#include "features/standin/standin.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

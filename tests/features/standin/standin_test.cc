@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "base/files.h"
-#include "features/standin/standin_report.h"
 #include "model_file/load_model.h"
 #include "reference/reduced_model.h"
 #include "tests/support/source_dir.h"

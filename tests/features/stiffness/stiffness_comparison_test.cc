@@ -67,15 +67,15 @@ TEST(StiffnessComparison, EqualWitnessesAgree) {
 
 struct PerturbedEntry {
   const char* check;
-  std::function<void(StiffnessWitness*)> bend;  // by twice the limit
+  std::function<void(StiffnessWitness*)> apply;  // by twice the limit
 };
-void PrintTo(const PerturbedEntry& bend, std::ostream* out) { *out << bend.check; }
+void PrintTo(const PerturbedEntry& entry, std::ostream* out) { *out << entry.check; }
 
 class PerturbedCompliance : public testing::TestWithParam<PerturbedEntry> {};
 
 TEST_P(PerturbedCompliance, FailsItsCheckOnly) {
   std::vector<StiffnessWitness> input = MakeWitnesses();
-  GetParam().bend(&input[2]);
+  GetParam().apply(&input[2]);
   const Comparison comparison = test::CompareAll(input);
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree) << comparison.reason;
   const CheckResult* check = comparison.FindCheck(GetParam().check);
@@ -133,8 +133,8 @@ INSTANTIATE_TEST_SUITE_P(All, PerturbedCompliance, testing::ValuesIn(kEntries),
 TEST(StiffnessComparison, EveryMetricIsPerturbedInATest) {
   for (const MetricRow& row : StiffnessMetricRows()) {
     EXPECT_TRUE(std::any_of(std::begin(kEntries), std::end(kEntries),
-                            [&](const PerturbedEntry& bend) {
-                              return std::string(bend.check).ends_with(std::string(".") + row.key);
+                            [&](const PerturbedEntry& entry) {
+                              return std::string(entry.check).ends_with(std::string(".") + row.key);
                             }))
         << row.key;
   }

@@ -101,15 +101,15 @@ TEST(StiffnessReport, ReportsWhatBrokeDown) {
   EXPECT_EQ(text.find("analytic  reference  simulated"), std::string::npos) << text;
 }
 
-struct Bending {
+struct PerturbedField {
   const char* what;
-  std::function<void(StiffnessReport*)> bend;
+  std::function<void(StiffnessReport*)> apply;
   std::set<std::string> unseen = {};  // where it is not reported: it has no place there
 };
 
 // The truth, perturbed in one place: page, terminal text and summary differ.
-TEST(StiffnessReport, NothingThatItHoldsGoesUntold) {
-  const std::vector<Bending> bendings = {
+TEST(StiffnessReport, EveryFieldIsReported) {
+  const std::vector<PerturbedField> perturbations = {
       {"scenario", [](auto* r) { r->scenario = "other"; }},
       {"scenario file", [](auto* r) { r->scenario_file = "other"; }, {"text"}},
       {"mechanism", [](auto* r) { r->mechanism = "other"; }},
@@ -151,13 +151,16 @@ TEST(StiffnessReport, NothingThatItHoldsGoesUntold) {
       {"parameter", [](auto* r) { r->parameters[0].value = 1e11; }, {"json", "text"}},
       {"command", [](auto* r) { r->command = "other"; }, {"json", "text"}}};
   const StiffnessReport right = test::StiffArm();
-  for (const Bending& bending : bendings) {
+  for (const PerturbedField& perturbed_entry : perturbations) {
     StiffnessReport perturbed = right;
-    bending.bend(&perturbed);
-    EXPECT_EQ(ToJson(perturbed) == ToJson(right), bending.unseen.contains("json")) << bending.what;
-    EXPECT_EQ(VerboseTable(perturbed) == VerboseTable(right), bending.unseen.contains("text"))
-        << bending.what;
-    EXPECT_EQ(ToHtml(perturbed) == ToHtml(right), bending.unseen.contains("page")) << bending.what;
+    perturbed_entry.apply(&perturbed);
+    EXPECT_EQ(ToJson(perturbed) == ToJson(right), perturbed_entry.unseen.contains("json"))
+        << perturbed_entry.what;
+    EXPECT_EQ(VerboseTable(perturbed) == VerboseTable(right),
+              perturbed_entry.unseen.contains("text"))
+        << perturbed_entry.what;
+    EXPECT_EQ(ToHtml(perturbed) == ToHtml(right), perturbed_entry.unseen.contains("page"))
+        << perturbed_entry.what;
   }
 }
 

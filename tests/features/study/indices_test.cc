@@ -1,5 +1,5 @@
 // Sobol' indices of functions that have them in closed form, and what statistics say of few values.
-#include "features/study/statistics.h"
+#include "features/study/summary.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Rows of points.csv: to the last bit, and nothing that is none is taken for one.
-#include "features/study/point_row.h"
+#include "features/study/summary.h"
 
 #include <gtest/gtest.h>
 

@@ -45,7 +45,7 @@ TEST_F(StudyCommand, RowsAreTheSameForAnyNumberOfJobsAndShards) {
 }
 
 // Rows that could be read but are not those that were computed: one digit, or one force.
-TEST_F(StudyCommand, AShardThatSomebodyTouchedIsNotMergedButComputedAgain) {
+TEST_F(StudyCommand, AModifiedShardIsNotMergedButComputedAgain) {
   WriteStudy("{sobol: 8}");
   for (const char* shard : {"1/2", "2/2"}) {
     ASSERT_EQ(Study("parts", std::string("--shard ") + shard).exit_code, 0);
@@ -148,7 +148,7 @@ TEST_F(StudyCommand, LeavesFoldersOfOthersAlone) {
 // means M = 2 and G = 10 + a and variances v = 1/3 each, S_m = v G² / (v G² + v M² + v²).
 // At every time the force is m (g + a(t)): its percentiles are those of m where m alone is varied.
 // The second drive carries three times as much.
-TEST_F(StudyCommand, NamesThatNobodyRecordsAreFoundBeforeAnythingIsComputed) {
+TEST_F(StudyCommand, UnknownChannelsAreFoundBeforeAnythingIsComputed) {
   WriteStudy("{sobol: 8}");
   std::string text = ReadAll(File("s.yaml"));
   text.replace(text.find("x.force.mean"), 12, "y.force.mean");

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "features/study/study_html.h"
-
 namespace mbv {
 namespace {
 

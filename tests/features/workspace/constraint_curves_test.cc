@@ -92,7 +92,7 @@ TEST(ConstraintCurves, OfATranslationalRobotAreTheCircleOfItsClosedForm) {
 }
 
 TEST(ConstraintCurves, AreNoneOfRobotsThatHaveNone) {
-  LoadResult result = LoadModel(SourcePath("/models/rubbing_five_bar/model.yaml"));
+  LoadResult result = LoadModel(SourcePath("/models/friction_five_bar/model.yaml"));
   EXPECT_TRUE(CurvesOf(*result.mechanism, {}).empty());
 }
 

@@ -146,7 +146,7 @@ Eigen::Vector2d Elbow(const Eigen::Vector2d& tool, double foot, double side) {
 }
 
 TEST(ReachableSet, AFiveBarsCirclesAndSingularCurvesAreThoseOfItsClosedForm) {
-  const Mechanism five_bar = ShippedModel("rubbing_five_bar");
+  const Mechanism five_bar = ShippedModel("friction_five_bar");
   SetArguments arguments = Over({"x", "y"}, 120);
   // Beyond type 2: the lens of two circles less the two inner ones.
   arguments.cross_singularities = true;
@@ -399,11 +399,11 @@ TEST(ReachableSet, ASectionOfTheScaraRobotIsThatOfItsClosedForm) {
   }
   const Answer answer = Ask(robot, arguments);
   ASSERT_TRUE(answer.set.agree) << answer.diagnostics.Text() << answer.set.verdict;
-  const scara::Parameters parameters = scara::ParametersOf(robot);
-  const scara::Limits limits = scara::LimitsOf(robot);
+  const scara_robot::Parameters parameters = scara_robot::ParametersOf(robot);
+  const scara_robot::Limits limits = scara_robot::LimitsOf(robot);
   const auto reached = [&](const Eigen::Vector2d& p) {
-    return scara::CheckPose(parameters, limits, {p[0], p[1], -0.165, pi / 4}).reach ==
-           scara::Reach::kReachable;
+    return scara_robot::CheckPose(parameters, limits, {p[0], p[1], -0.165, pi / 4}).reach ==
+           scara_robot::Reach::kReachable;
   };
   size_t checked = 0;
   for (const TracedLoop& loop : answer.set.traced.sections[0].loops) {
@@ -436,7 +436,7 @@ TEST(ReachableSet, AFloodWithAWrongBoundDisagrees) {
 }
 
 TEST(ReachableSet, ItsNumbersDoNotDependOnTheNumberOfThreads) {
-  const Mechanism five_bar = ShippedModel("rubbing_five_bar");
+  const Mechanism five_bar = ShippedModel("friction_five_bar");
   SetArguments arguments = Over({"x", "y"}, 40);
   const Answer one = Ask(five_bar, arguments);
   arguments.flood.threads = 3;
@@ -507,7 +507,7 @@ TEST(ReachableSet, WhatCannotBeAnsweredIsRefusedWithAReason) {
   EXPECT_THAT(Refusal(tripod, Over({"x", "y", "yaw"})), HasSubstr("'platform.yaw'"));
   EXPECT_THAT(Refusal(tripod, Over({"x=2:3", "y"})),
               HasSubstr("the pose to begin with is beyond leg1 at 0.75 m by 2.0"));
-  EXPECT_THAT(Refusal(ShippedModel("rubbing_five_bar"), Over({"x=2:3", "y"})),
+  EXPECT_THAT(Refusal(ShippedModel("friction_five_bar"), Over({"x=2:3", "y"})),
               HasSubstr("cannot be reached from home: tool.x = 2.5"));
   EXPECT_THAT(Refusal(tripod, Over({"x=3:2", "y"})), HasSubstr("LOW is not below HIGH"));
   EXPECT_THAT(Refusal(tripod, Over({"x", "y", "z"}, 4000)), HasSubstr("takes about"));

@@ -23,7 +23,7 @@ class WorkspaceCommand : public testing::Test {
 
 TEST_F(WorkspaceCommand, WritesPageBoundaryPosesAndNumbers) {
   const ProgramResult result =
-      Call("rubbing_five_bar --over x_mm=-200:200,y_mm=150:500 --resolution 40 --json -");
+      Call("friction_five_bar --over x_mm=-200:200,y_mm=150:500 --resolution 40 --json -");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto json = nlohmann::json::parse(result.out);
   const auto& set = json["set"];
@@ -33,7 +33,7 @@ TEST_F(WorkspaceCommand, WritesPageBoundaryPosesAndNumbers) {
             set["flooded"]["error"].get<double>());
   EXPECT_FALSE(set["quality"].empty());
   EXPECT_THAT(result.err, HasSubstr("AGREE"));
-  const std::filesystem::path folder = mbverify.folder() / "out/rubbing_five_bar/workspace";
+  const std::filesystem::path folder = mbverify.folder() / "out/friction_five_bar/workspace";
   const std::string boundary = ReadAll(folder / "reachable_boundary.csv");
   EXPECT_THAT(boundary, HasSubstr("section,loop,arc,tool.x_m,tool.y_m,bound,kind"));
   EXPECT_THAT(boundary, HasSubstr("box tool.x = -0.2,box"));
@@ -55,16 +55,16 @@ TEST_F(WorkspaceCommand, ClosedFormsStandBesideAndASurfaceIsWritten) {
 }
 
 TEST_F(WorkspaceCommand, WaysToCloseAndTypeTwoCurvesAreListed) {
-  const ProgramResult ways = Call("rubbing_five_bar --modes all --at x=0.1 --json -");
+  const ProgramResult ways = Call("friction_five_bar --modes all --at x=0.1 --json -");
   ASSERT_EQ(ways.exit_code, 0) << ways.err;
   const auto modes = nlohmann::json::parse(ways.out)["modes"];
   EXPECT_EQ(modes[0]["count"], 2);  // the tool above and below its forearms' feet
   EXPECT_EQ(modes[1]["count"], 4);  // two elbows of two limbs
   EXPECT_THAT(ways.err, HasSubstr("2 ways to close"));
-  const std::filesystem::path folder = mbverify.folder() / "out/rubbing_five_bar/workspace";
+  const std::filesystem::path folder = mbverify.folder() / "out/friction_five_bar/workspace";
   EXPECT_THAT(ReadAll(folder / "modes.csv"), HasSubstr("drives,2,1,"));
   EXPECT_THAT(ReadAll(folder / "modes.html"), HasSubstr("Ways to close"));
-  const ProgramResult curves = Call("rubbing_five_bar --joint-space --over motor1,motor2 --json -");
+  const ProgramResult curves = Call("friction_five_bar --joint-space --over motor1,motor2 --json -");
   ASSERT_EQ(curves.exit_code, 0) << curves.err;
   // Forearms in one line: two limbs cannot meet in three ways. Where the elbows meet, the equal
   // forearms turn about them while the motors rest.
@@ -97,8 +97,8 @@ TEST_F(WorkspaceCommand, BadInputIsRefusedWithExitCode2) {
            {"four_bar --over x,qq", "there is no coordinate 'qq'"},
            {"four_bar --over x --at y=0", "'coupler.y' is no coordinate of its own at home"},
            {"floating_loop", "has no end"},
-           {"rubbing_five_bar --resolution 90000", "takes about"},
-           {"rubbing_five_bar --joint-space --over x,y", "two drives are needed"},
+           {"friction_five_bar --resolution 90000", "takes about"},
+           {"friction_five_bar --joint-space --over x,y", "two drives are needed"},
            {"stewart --modes drives --resolution 40", "another thing than a set"},
            {"spring_cart --modes drives", "1 drives do not determine 2 degrees of freedom"},
            {"four_bar --base crank", "robot"}}) {

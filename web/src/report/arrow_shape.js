@@ -15,7 +15,7 @@ export function straightArrow(length, headLength, push) {
 }
 
 /**
- * A bent arrow: a share of an arc about z that starts on +x, made of whole segments, at least one.
+ * A curved arrow: a share of an arc about z that starts on +x, made of whole segments, at least one.
  * @param {number} share 0 … 1
  * @param {{radius: number, angle: number, segments: number}} arc the whole one [m, rad]
  * @param {boolean} positive turns about +z

@@ -64,7 +64,7 @@ export class Arrow {
     this.group.position.copy(at);
     this.group.quaternion.setFromUnitVectors(this.turns ? kZ : kY, axis);
     for (const parts of this.parts) {
-      if (this.turns) this.bend(parts, share, force >= 0);
+      if (this.turns) this.curve(parts, share, force >= 0);
       else this.stretch(parts, share * this.size, force >= 0);
     }
   }
@@ -80,7 +80,7 @@ export class Arrow {
   }
 
   /** @param {Three} parts @param {number} share @param {boolean} positive */
-  bend({shaft, head}, share, positive) {
+  curve({shaft, head}, share, positive) {
     const {shown, head: [x, y], headAngle} = bentArrow(share, this.arc, positive);
     shaft.geometry.setDrawRange(0, Math.round(shaft.geometry.index.count * shown));
     shaft.scale.set(1, positive ? 1 : -1, 1);

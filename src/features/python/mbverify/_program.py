@@ -18,7 +18,7 @@ from . import _native
 
 
 class ProgramError(RuntimeError):
-    """The program ended in a way that its results do not tell; `exit_code`, `text`."""
+    """The program ended in a way that its results do not report; `exit_code`, `text`."""
 
     def __init__(self, message, exit_code, text):
         super().__init__(message)

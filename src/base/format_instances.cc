@@ -1,3 +1,0 @@
-#include "base/format_instances.h"
-
-MBV_FORMAT_INSTANCES(template)

@@ -1,0 +1,429 @@
+#include "report/sections.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+
+#include "plot/svg_plot.h"
+#include "report/page.h"
+#include "report/plot_points.h"
+
+namespace mbv {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Limit = ContactLoad::Limit;
+
+// Of the witness that is shown first.
+std::vector<const ContactLoad*> MainContactLoads(const Report& report) {
+  const PairComparison* pair = report.comparison.MainPair();
+  std::vector<const ContactLoad*> loads;
+  for (const std::string& witness :
+       {pair != nullptr ? pair->measured : "", pair != nullptr ? pair->truth : "",
+        report.contact_loads.empty() ? "" : report.contact_loads.front().witness}) {
+    for (const ContactLoad& load : report.contact_loads) {
+      if (load.witness == witness) loads.push_back(&load);
+    }
+    if (!loads.empty()) break;
+  }
+  return loads;
+}
+
+Cell UseCell(const ContactLoad& load, Limit limit) {
+  const ContactLoad::Use* use = load.Find(limit);
+  if (use == nullptr) return "–";
+  const Mark mark = use->exceeded() ? Mark::kWarn : Mark::kNone;
+  switch (limit) {
+    case Limit::kLift:
+      return {fmt::format("{:.4g} N", use->worst), mark};
+    case Limit::kSlip:
+      return {std::isnan(use->allowed) ? fmt::format("{:.3g}", use->worst)
+                                       : fmt::format("{:.3g} of {:.3g}", use->worst, use->allowed),
+              mark};
+    case Limit::kTip:
+      return {fmt::format("{:.3g} mm", 1e3 * use->worst), mark};
+    case Limit::kTwist:
+      return {std::isnan(use->allowed)
+                  ? fmt::format("{:.3g} mm", 1e3 * use->worst)
+                  : fmt::format("{:.3g} of {:.3g} mm", 1e3 * use->worst, 1e3 * use->allowed),
+              mark};
+    case Limit::kFall:
+      return {std::isinf(use->worst) ? "any fails" : fmt::format("{:.3g} × stated", use->worst),
+              mark};
+  }
+  return "–";
+}
+
+std::string HoldText(const ContactLoad& load) {
+  std::string text;
+  for (const ContactLoad::Use& use : load.uses) {
+    if (!use.exceeded()) continue;
+    text += fmt::format("{}{}s from {:.4g} s on", text.empty() ? "" : ", ", ToText(use.limit),
+                        use.from_s);
+  }
+  if (text.empty()) text = "holds";
+  return load.unique() ? text : text + " (one share of many)";
+}
+
+// Lengths in millimetres.
+std::string PressureSvg(const ContactLoad& load) {
+  LinePlot plot{
+      .title = load.name() + ": centre of pressure", .x_label = "x [mm]", .y_label = "y [mm]"};
+  PlotLine outline{.label = "ground contact"};
+  for (const Eigen::Vector2d& p : load.outline) {
+    outline.points.emplace_back(1e3 * p.x(), 1e3 * p.y());
+  }
+  if (outline.points.size() > 2) outline.points.push_back(outline.points.front());
+  PlotLine path{.label = load.witness};
+  const size_t stride = 1 + load.pressure.size() / 1500;
+  for (size_t i = 0; i < load.pressure.size(); i += stride) {
+    path.points.emplace_back(1e3 * load.pressure[i].x(), 1e3 * load.pressure[i].y());
+  }
+  plot.lines = {std::move(outline), std::move(path)};
+  return ToSvg(plot);
+}
+
+}  // namespace
+
+ReportSection ContactSection(const Report& report) {
+  ReportSection section{.title = "Feet on the ground", .link = "Contacts"};
+  const std::vector<const ContactLoad*> loads = MainContactLoads(report);
+  if (loads.empty()) return section;
+  Table table{.name = "contacts",
+              .caption = "Feet on the ground, " + loads.front()->witness,
+              .columns = {Text("foot"), Text("kind"), Digits("normal force, least"), Digits("most"),
+                          Digits("friction needed"), Digits("centre of pressure inside by"),
+                          Spare(Digits("twist")), Text("")}};
+  for (const ContactLoad* load : loads) {
+    const bool exceeded =
+        std::ranges::any_of(load->uses, [](const ContactLoad::Use& use) { return use.exceeded(); });
+    table.rows.push_back({load->name(), load->kind, UseCell(*load, Limit::kLift),
+                          std::isnan(load->most_normal)
+                              ? Cell("–")
+                              : Cell(fmt::format("{:.4g} N", load->most_normal)),
+                          UseCell(*load, load->Find(Limit::kFall) ? Limit::kFall : Limit::kSlip),
+                          UseCell(*load, Limit::kTip), UseCell(*load, Limit::kTwist),
+                          Cell(HoldText(*load), exceeded ? Mark::kWarn : Mark::kOk)});
+  }
+  section.Add(std::move(table));
+  const bool shared =
+      std::ranges::any_of(loads, [](const ContactLoad* load) { return !load->unique(); });
+  const bool together = loads.back()->contact.empty();
+  if (shared) {
+    section.Note(
+        fmt::format("Statics leaves open what the feet share of the forces: of all shares "
+                    "the one with the least drive forces is shown.{}",
+                    together ? " What all feet bear together follows from the motion." : ""),
+        On::kAll);
+  }
+  if (loads.size() > 1 && !together) {
+    section.Note(
+        "What all feet bear together is not judged: something else ties the robot to the ground, "
+        "or they do not stand on one plane and some state no friction or size.",
+        On::kAll);
+  }
+  for (const ContactLoad* load : loads) {
+    if (load->outline.size() > 2 && !load->pressure.empty()) {
+      section.Add(Drawing{PressureSvg(*load)}, On::kPage);
+    }
+  }
+  section.Note(
+      "Both computations hold the feet; whether the ground can is judged here. Ground only pushes; "
+      "friction needed is the tangential over the normal force; the centre of pressure must stay "
+      "within what touches the ground.");
+  return section;
+}
+
+Json ContactsJson(const Report& report) {
+  Json contacts = Json::array();
+  for (const ContactLoad& load : report.contact_loads) {
+    Json limits = Json::array();
+    for (const ContactLoad::Use& use : load.uses) {
+      limits.push_back({{"of", ToText(use.limit)},
+                        {"worst", Number(use.worst)},
+                        {"time_s", Number(use.time_s)},
+                        {"allowed", Number(use.allowed)},
+                        {"exceeded", use.exceeded()},
+                        {"unique", use.unique},
+                        {"from_s", Number(use.from_s)},
+                        {"samples", use.beyond}});
+    }
+    contacts.push_back({{"contact", load.contact},
+                        {"kind", load.kind},
+                        {"witness", load.witness},
+                        {"most_normal_N", Number(load.most_normal)},
+                        {"mean_normal_N", Number(load.mean_normal)},
+                        {"limits", std::move(limits)}});
+  }
+  return contacts;
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Of the second derivative's mean square: 1 % of its RMS is reported unasked.
+constexpr double kReportedShare = 1e-4;
+
+std::string SmoothingText(const MotionTable& table) {
+  if (!table.smoothed()) return "none";
+  return fmt::format(
+      "{}, deviation {:.2g} {}{}", table.smoothing, table.deviation, table.unit,
+      std::isfinite(table.cutoff_hz) ? fmt::format(", halves {:.3g} Hz", table.cutoff_hz) : "");
+}
+
+std::string KindText(const MotionTable& table) {
+  return fmt::format("{} rows{}, {:.6g} … {:.6g} s{}", table.rows,
+                     table.with_rates ? " with rates" : "", table.from_s, table.to_s,
+                     table.periodic ? ", repeated" : "");
+}
+
+std::string ChangeText(double rms, double max, const std::string& unit) {
+  return fmt::format("RMS {:.2e}, at most {:.2e} {}", rms, max, unit);
+}
+
+Table TablesTable(const Report& report) {
+  Table html{
+      .caption = "Tables and their splines",
+      .columns = {Text("of"), Text("file"), Text("column"), Text("rows"), Text("smoothing"),
+                  Digits("smoothing changes by"), Digits("its second derivative by"),
+                  Digits("which is (RMS)")},
+  };
+  for (const MotionTable& table : report.tables) {
+    html.rows.push_back({table.name, table.file, table.column, KindText(table),
+                         SmoothingText(table),
+                         ChangeText(table.change_rms, table.change_max, table.unit),
+                         ChangeText(table.acceleration_change_rms, table.acceleration_change_max,
+                                    table.unit + "/s²"),
+                         fmt::format("{:.5g} {}/s²", table.acceleration_rms, table.unit)});
+  }
+  return html;
+}
+
+Table ForcesTable(const Report& report) {
+  Table html{
+      .caption = "What smoothing takes out of the drive forces",
+      .columns = {Text("drive"), Digits("force, RMS"), Digits("change, RMS"),
+                  Digits("change, largest")},
+  };
+  for (const SmoothedForce& force : report.smoothed_forces) {
+    html.rows.push_back({force.drive, fmt::format("{:.6g} {}", force.rms, force.unit),
+                         fmt::format("{:.3e} {}", force.change_rms, force.unit),
+                         fmt::format("{:.3e} {}", force.change_max, force.unit)});
+  }
+  return html;
+}
+
+}  // namespace
+
+ReportSection MotionTableSection(const Report& report, bool verbose) {
+  ReportSection section{.title = "Tables that command the motion", .link = "Tables"};
+  if (report.tables.empty()) return section;
+  section.Add(TablesTable(report), On::kPage);
+  Items lines;
+  for (const MotionTable& table : report.tables) {
+    lines.texts.push_back(fmt::format("{} follows column '{}' of {}: {}; smoothing: {}", table.name,
+                                      table.column, table.file, KindText(table),
+                                      SmoothingText(table)));
+    if (table.moves && (verbose || table.smoothed() || table.noise_share() > kReportedShare)) {
+      lines.texts.push_back(
+          fmt::format("  {} by {}, the second derivative by {} (RMS of all: {:.4g})",
+                      table.smoothed() ? "smoothing changes it" : "smoothing: auto would change it",
+                      ChangeText(table.change_rms, table.change_max, table.unit),
+                      ChangeText(table.acceleration_change_rms, table.acceleration_change_max,
+                                 table.unit + "/s²"),
+                      table.acceleration_rms));
+    }
+    if (!verbose) continue;
+    for (const std::string& note : table.notes) lines.texts.push_back("  " + note);
+  }
+  section.Add(std::move(lines), On::kTerminal);
+  section.Note(
+      "Quintic splines through all rows, or as near as their noise allows. Without smoothing, the "
+      "changes are those that smoothing: auto would make: they are what noise and rounding of the "
+      "rows add to the second derivative, which drive forces follow.");
+  section.Add(ForcesTable(report));
+  return section;
+}
+
+Json MotionTableJson(const Report& report) {
+  Json tables = Json::array(), forces = Json::array();
+  for (const MotionTable& table : report.tables) {
+    tables.push_back({{"of", table.name},
+                      {"file", table.file},
+                      {"column", table.column},
+                      {"unit", table.unit},
+                      {"rows", table.rows},
+                      {"from_s", Number(table.from_s)},
+                      {"to_s", Number(table.to_s)},
+                      {"periodic", table.periodic},
+                      {"with_rates", table.with_rates},
+                      {"smoothing", table.smoothing},
+                      {"deviation", Number(table.deviation)},
+                      {"cutoff_hz", Number(table.cutoff_hz)},
+                      {"change_rms", Number(table.change_rms)},
+                      {"change_max", Number(table.change_max)},
+                      {"acceleration_change_rms", Number(table.acceleration_change_rms)},
+                      {"acceleration_change_max", Number(table.acceleration_change_max)},
+                      {"acceleration_rms", Number(table.acceleration_rms)},
+                      {"noise_share", Number(table.noise_share())},
+                      {"notes", table.notes}});
+  }
+  for (const SmoothedForce& force : report.smoothed_forces) {
+    forces.push_back({{"drive", force.drive},
+                      {"unit", force.unit},
+                      {"rms", Number(force.rms)},
+                      {"change_rms", Number(force.change_rms)},
+                      {"change_max", Number(force.change_max)}});
+  }
+  return {{"tables", std::move(tables)}, {"smoothed_forces", std::move(forces)}};
+}
+
+namespace {
+
+constexpr size_t kMostPlots = 8;  // columns, the worst first
+
+std::string NumberOrOff(double value, const char* format = "{:.2e}") {
+  if (std::isinf(value)) return "off";
+  return std::isnan(value) ? "–" : fmt::format(fmt::runtime(format), value);
+}
+
+const TableColumn& SourceOf(const TableVerdict& table, const TableColumnResult& column) {
+  return table.columns[column.column];
+}
+
+// Worst first; columns without a number count as worst.
+std::vector<const TableColumnResult*> ByRatio(const PairComparison& pair) {
+  std::vector<const TableColumnResult*> columns;
+  for (const TableColumnResult& column : pair.columns) columns.push_back(&column);
+  const auto key = [](const TableColumnResult* column) {
+    const double ratio = column->ratio();
+    return std::isnan(ratio) ? std::numeric_limits<double>::infinity() : ratio;
+  };
+  std::stable_sort(columns.begin(), columns.end(),
+                   [&](const auto* a, const auto* b) { return key(a) > key(b); });
+  return columns;
+}
+
+Table ColumnTable(const TableVerdict& table, const PairComparison& pair, bool verbose) {
+  Table columns{.caption = fmt::format("Columns of {} against {}, worst first", table.name,
+                                       table.judged_against),
+                .columns = {Text("signal"), Text("column", On::kPage), Digits("RMS"),
+                            Digits("uncertainty"), Text("of it", verbose ? On::kAll : On::kPage),
+                            Digits("RMS difference"), Digits("tube"), Digits("largest difference"),
+                            Digits("tube"), Digits("at", On::kPage), Text("")}};
+  for (const TableColumnResult* column : ByRatio(pair)) {
+    const TableColumn& source = SourceOf(table, *column);
+    columns.rows.push_back(
+        {column->channel, source.heading, NumberOrOff(column->rms, "{:.6g} ") + source.channel.unit,
+         NumberOrOff(column->standard), UncertaintyText(table.uncertainty[column->column]),
+         NumberOrOff(column->error_rms), NumberOrOff(column->tube_rms),
+         NumberOrOff(column->error_max), NumberOrOff(column->tube_max),
+         NumberOrOff(column->time_s, "{:.4g} s"),
+         column->inside() ? Cell("inside", Mark::kOk)
+         : table.judged   ? Cell("OUTSIDE", Mark::kFail)
+                          : Cell("not judged", Mark::kOff)});
+  }
+  return columns;
+}
+
+// The table's values with their tube on the other witness' curve, and the difference in the tube.
+void AddPlots(const Report& report, const PairComparison& pair, ReportSection* section) {
+  const TableVerdict& table = *report.comparison.table;
+  const Trace* values = TraceOf(report, role::kReference.name);
+  const Trace* other = TraceOf(report, table.judged_against);
+  if (values == nullptr || other == nullptr) return;
+  const std::vector<const TableColumnResult*> columns = ByRatio(pair);
+  for (size_t k = 0; k < std::min(kMostPlots, columns.size()); ++k) {
+    const TableColumnResult& column = *columns[k];
+    const int a = values->Find(column.channel), b = other->Find(column.channel);
+    if (a < 0 || b < 0) continue;
+    const std::string& unit = SourceOf(table, column).channel.unit;
+    PlotPoints points, curve, upper, lower, difference;
+    for (const auto& [i, j] : AlignSamples(*values, *other)) {
+      const double t = values->time_s[static_cast<size_t>(i)];
+      const double value = values->values(i, a);
+      const double error = value - other->values(j, b);
+      points.emplace_back(t, value);
+      upper.emplace_back(t, value + column.tube_max);
+      lower.emplace_back(t, value - column.tube_max);
+      difference.emplace_back(t,
+                              unit == "rad" ? AngleDifference(value, other->values(j, b)) : error);
+    }
+    for (size_t i = 0; i < other->time_s.size(); ++i) {
+      curve.emplace_back(other->time_s[i], other->values(static_cast<Eigen::Index>(i), b));
+    }
+    if (difference.empty()) continue;
+    const double from = difference.front().first, to = difference.back().first;
+    LinePlot signal{.title = column.channel, .x_label = "time [s]", .y_label = "[" + unit + "]"};
+    signal.lines = {{.label = table.judged_against, .points = Thinned(curve)},
+                    {.label = table.name, .points = Thinned(points), .markers = true},
+                    {.label = "tube", .points = Thinned(upper)},
+                    {.label = "", .points = Thinned(lower)}};
+    LinePlot error{
+        .title = fmt::format("{}: {} − {}", column.channel, table.name, table.judged_against),
+        .x_label = "time [s]",
+        .y_label = "[" + unit + "]"};
+    error.lines = {{.label = "difference", .points = Thinned(difference), .markers = true},
+                   {.label = fmt::format("tube ±{:.2g}", column.tube_max),
+                    .points = {{from, column.tube_max}, {to, column.tube_max}}},
+                   {.label = "", .points = {{from, -column.tube_max}, {to, -column.tube_max}}}};
+    section->Add(Drawing{ToSvg(signal)});
+    section->Add(Drawing{ToSvg(error)});
+  }
+  if (columns.size() > kMostPlots) {
+    section->Note(fmt::format("The {} worst of {} columns.", kMostPlots, columns.size()));
+  }
+}
+
+}  // namespace
+
+const PairComparison* TablePair(const Comparison& comparison) {
+  if (!comparison.table || comparison.table->judged_against.empty()) return nullptr;
+  for (const PairComparison& pair : comparison.pairs) {
+    const std::string& other = pair.measured == role::kReference ? pair.truth : pair.measured;
+    const bool of_table = pair.Involves(role::kReference);
+    if (of_table && other == comparison.table->judged_against && !pair.columns.empty()) {
+      return &pair;
+    }
+  }
+  return nullptr;
+}
+
+std::string UncertaintyText(const TableUncertainty& uncertainty) {
+  if (uncertainty.stated) return "stated in the scenario";
+  std::string text;
+  for (const auto& [name, value] :
+       {std::pair{"digits", uncertainty.digits}, std::pair{"noise", uncertainty.noise},
+        std::pair{"time stamps", uncertainty.stamps},
+        std::pair{"interpolation", uncertainty.interpolation}}) {
+    if (value > 0.0) text += fmt::format("{}{} {:.1e}", text.empty() ? "" : ", ", name, value);
+  }
+  return text;
+}
+
+ReportSection ReferenceTableSection(const Report& report, bool verbose) {
+  ReportSection section{.title = "The table in the reference's place", .link = "Table"};
+  if (!report.comparison.table) return section;
+  const TableVerdict& table = *report.comparison.table;
+  section.Add(Paragraph{fmt::format("the reference is the table {}: {}", table.name, table.grid)});
+  section.Add(Paragraph{table.too_coarse, Paragraph::Look::kOdd}, On::kPage);
+  for (const std::string& diagnosis : table.diagnoses) {
+    section.Add(Paragraph{diagnosis, Paragraph::Look::kOdd}, On::kPage);
+  }
+  if (const PairComparison* pair = TablePair(report.comparison)) {
+    section.Add(ColumnTable(table, *pair, verbose));
+    section.Note(fmt::format("The tube is {:g} times the column's uncertainty or the scenario's "
+                             "limit, whichever is wider.",
+                             table.coverage),
+                 On::kAll);
+    AddPlots(report, *pair, &section);
+  }
+  Fold notes{"How the file was read", {}};
+  if (!table.notes.empty()) notes.blocks.push_back({Items{table.notes}});
+  section.Add(std::move(notes), verbose ? On::kAll : On::kPage);
+  return section;
+}
+
+}  // namespace mbv
