@@ -60,7 +60,7 @@ struct WitnessProof {
   size_t values = 0;         ///< that were compared
   size_t reactions = 0;      ///< of them
   double force_error = 0.0;  ///< at most, of the largest force of this unit along the motion
-  /// At least: beyond any doubt it is off by this.
+  /// At least: it is certainly off by this.
   double force_error_at_least = 0.0;
   double motion_error = 0.0;  ///< as force_error, of positions, velocities, accelerations
   double reaction_error = 0.0;

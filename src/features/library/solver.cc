@@ -116,7 +116,7 @@ Model Model::Load(const std::string& name, const std::map<std::string, double>& 
   std::vector<Note> notes = NotesOf(loaded.diagnostics);
   if (!loaded.mechanism) throw InputError(std::move(notes));
   for (const ModelCaveat& caveat : loaded.caveats) {
-    notes.push_back({.is_error = false, .file = *file, .message = caveat.text});
+    notes.push_back({.is_error = false, .file = *file, .message = caveat.text, .hint = {}});
   }
   auto data = std::make_shared<Data>();
   data->mechanism = *std::move(loaded.mechanism);

@@ -112,7 +112,7 @@ nlohmann::ordered_json ResultJson(const std::string& file, const RunOutcome& out
           {"findings", FindingObjects(outcome.diagnostics)}};
 }
 
-// What --certify asks for; false (after a message) if it is no number of samples.
+// What --certify asks for; false (after a message) if it is not a number of samples.
 bool ReadCertify(const std::string& text, CertifyOptions* options) {
   const bool digits = !text.empty() && text.size() < 7 &&
                       std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });

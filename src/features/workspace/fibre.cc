@@ -26,17 +26,17 @@ constexpr int kLines = 4095,
 
 // Of the parabola through three points.
 struct Parabola {
-  double x1, y1, slope, bend;  // about the middle point: y1 + slope s + bend s²
+  double x1, y1, slope, square;  // about the middle point: y1 + slope s + square s²
   Parabola(const std::array<double, 3>& x, const std::array<double, 3>& y)
-      : x1(x[1]), y1(y[1]), slope(0.0), bend(0.0) {
+      : x1(x[1]), y1(y[1]), slope(0.0), square(0.0) {
     const double a = x[0] - x[1], b = x[2] - x[1];
     const double da = (y[0] - y[1]) / a, db = (y[2] - y[1]) / b;
-    bend = (db - da) / (b - a);
-    slope = da - bend * a;
+    square = (db - da) / (b - a);
+    slope = da - square * a;
   }
   [[nodiscard]] double at(double x) const {
     const double s = x - x1;
-    return y1 + s * (slope + bend * s);
+    return y1 + s * (slope + square * s);
   }
 };
 
@@ -98,8 +98,8 @@ Fibre::Reach Fibre::Scan(const PoseSpace& space, const PlacedPose& from, size_t 
                                          nodes[k + 1].at.pose.margin[j]};
         if (y[1] > y[0] || y[1] > y[2] || y[0] + y[2] == 2 * y[1]) continue;
         const Parabola p(x, y);
-        const double bottom = x[1] - 0.5 * p.slope / p.bend, drop = y[1] - p.at(bottom);
-        if (!(p.bend > 0.0) || p.at(bottom) - 4 * drop > 0.0) continue;
+        const double bottom = x[1] - 0.5 * p.slope / p.square, drop = y[1] - p.at(bottom);
+        if (!(p.square > 0.0) || p.at(bottom) - 4 * drop > 0.0) continue;
         PlacedPose there;
         if (Go(space, nodes[k].at, level, bottom, &there) != Reach::kWhole) {
           reach = Reach::kPart;
@@ -434,8 +434,8 @@ class RangeTracer {
       const double sign = (end == 1) == settings_.for_all ? 1.0 : -1.0;  // a least or a largest end
       if (!(sign * middle <= sign * y[0] && sign * middle <= sign * y[2])) continue;
       const Parabola p(x, y);
-      if (p.bend == 0.0) continue;
-      sum += p.at(-0.5 * p.slope / p.bend) - middle;
+      if (p.square == 0.0) continue;
+      sum += p.at(-0.5 * p.slope / p.square) - middle;
     }
     return sum;
   }

@@ -31,7 +31,7 @@ struct ModeSettings {
 struct AssemblyMode {
   SpacePose pose;
   bool within = true;  ///< the ranges of drives and joints
-  int starts = 0;      ///< that led here
+  int starts = 0;      ///< that ended here
   VecX drives;         ///< values [m or rad], turns near home's
   MatX outputs;        ///< outputs × 6: x … yaw
 };

@@ -381,7 +381,7 @@ struct ForeignMjcf::Impl {
     return limited == nullptr || std::string_view(limited) == "auto";
   }
 
-  // As MuJoCo reads it: what is not there is 0. What is no number is for its reader to judge.
+  // As MuJoCo reads it: what is not there is 0. What is not a number is for its reader to judge.
   static bool HasRoom(const char* range) {
     double lower = 0.0, upper = 0.0;
     std::istringstream text(range);

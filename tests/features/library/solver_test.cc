@@ -685,7 +685,8 @@ TEST_P(SolverAllocations, OfRowsDoNotGrowWithTheirNumber) {
 INSTANTIATE_TEST_SUITE_P(Each, SolverAllocations,
                          testing::Values("stewart", "stabilizing_platform", "spr_tripod",
                                          "scara_robot", "cabin_robot", "redundant_five_bar",
-                                         "geared_press", "friction_five_bar", "bushed_linkage", ""));
+                                         "geared_press", "friction_five_bar", "bushed_linkage",
+                                         ""));
 
 TEST_F(SolverRows, NameTheOnesThatFail) {
   MatX expected, forces;

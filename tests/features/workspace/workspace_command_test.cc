@@ -64,7 +64,8 @@ TEST_F(WorkspaceCommand, WaysToCloseAndTypeTwoCurvesAreListed) {
   const std::filesystem::path folder = mbverify.folder() / "out/friction_five_bar/workspace";
   EXPECT_THAT(ReadAll(folder / "modes.csv"), HasSubstr("drives,2,1,"));
   EXPECT_THAT(ReadAll(folder / "modes.html"), HasSubstr("Ways to close"));
-  const ProgramResult curves = Call("friction_five_bar --joint-space --over motor1,motor2 --json -");
+  const ProgramResult curves =
+      Call("friction_five_bar --joint-space --over motor1,motor2 --json -");
   ASSERT_EQ(curves.exit_code, 0) << curves.err;
   // Forearms in one line: two limbs cannot meet in three ways. Where the elbows meet, the equal
   // forearms turn about them while the motors rest.
