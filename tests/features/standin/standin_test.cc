@@ -717,7 +717,7 @@ TEST(Standin, RefusesWhatHasNoSerialModel) {
                              HasSubstr("a set that does: ankle.0, ankle.1")));
   EXPECT_THAT(text(ankle, {"ankle.0", "ankle.1", "left_hinge"}),
               HasSubstr("depend on each other at home: left_hinge"));
-  EXPECT_THAT(text(ankle, {"left_heel.0", "ankle.0"}), HasSubstr("is a ball's"));
+  EXPECT_THAT(text(ankle, {"left_heel.0", "ankle.0"}), HasSubstr("is of a spherical joint"));
   EXPECT_THAT(text(ankle, {}), HasSubstr("no joints are chosen"));
   EXPECT_THAT(text(ankle, kPitchRoll, {.ranges = {{"ankle.0", 0.1, 0.1}}}), HasSubstr("is empty"));
   EXPECT_THAT(text(ankle, kPitchRoll, {.ranges = {{"hip", 0.1, 0.2}}}), HasSubstr("not chosen"));
