@@ -94,11 +94,10 @@ ReportSection SectionOf(const Certificate& certificate) {
   section.Add(Fold{"Where, and how near to a singular pose", {{SampleTable(certificate)}}},
               On::kPage);
   section.Add(Items{certificate.left_out}, On::kPage);
-  section.Note(fmt::format(
+  section.Note(
       "Interval arithmetic of 113 bits or more: one and only one pose near the reference's, and "
       "bounds that hold its rates, forces and reactions, for the numbers of the model and of the "
-      "commands as they stand in doubles. {} samples in {:.2g} s.",
-      certificate.samples.size(), certificate.wall_s));
+      "commands as they stand in doubles.");
   return section;
 }
 

@@ -49,7 +49,6 @@ struct SampleProof {
   /// Drives: position, velocity, acceleration, force; prescribed joints: base force; reactions of
   /// all joints where statics leaves none open.
   std::vector<ProvedValue> values;
-  double wall_s = kNan;
 
   [[nodiscard]] bool proved() const { return why_not.empty(); }
 };
@@ -81,7 +80,6 @@ struct Certificate {
   std::vector<SampleProof> samples;
   std::vector<WitnessProof> witnesses;
   std::vector<std::string> left_out;  ///< sentences: what the proof does not say
-  double wall_s = kNan;
 
   [[nodiscard]] size_t proved() const;
   [[nodiscard]] const WitnessProof* FirstWrong() const;
@@ -93,6 +91,8 @@ struct CertifyOptions {
   size_t samples = 10;  ///< spread over the motion, with the first and the last; 0: all
   /// Errors of forces beyond which a computed witness is wrong.
   double limit = 1e-9;
+  /// Rates of equations that are not needed for the pose may contradict the others' by this share.
+  double contradiction = 1e-9;
   int least_bits = 113;  ///< more where they do not suffice
   std::function<void(double)> progress = {};
 };

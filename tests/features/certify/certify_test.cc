@@ -328,6 +328,21 @@ TEST(Certify, ProvesNothingAtSingularPosesOrBeyondReach) {
             certificate.samples[0].closure_distance_high);
 }
 
+// A hinge that is tilted in space freezes a planar loop. So little that the reference follows the
+// command nevertheless, the equations out of the plane contradict it by as much.
+TEST(Certify, SeesEquationsThatContradictTheCommand) {
+  Case c = FourBar();
+  c.mechanism.joints[1].X_PF.rotate(Eigen::AngleAxisd(1e-10, Vec3::UnitX()));
+  const Certificate allowed = Certify(c.mechanism, c.motion, {});
+  ASSERT_EQ(allowed.proved(), allowed.samples.size()) << allowed.samples.back().why_not;
+  EXPECT_GT(allowed.samples.back().left_open, 1e-12);
+  const Certificate refused = Certify(c.mechanism, c.motion, {}, {.contradiction = 1e-13});
+  EXPECT_LT(refused.proved(), refused.samples.size());
+  EXPECT_THAT(refused.samples[refused.samples.size() / 2].why_not, HasSubstr("contradict"));
+  c.mechanism.joints[1].X_PF.rotate(Eigen::AngleAxisd(1e-7, Vec3::UnitX()));
+  EXPECT_EQ(Certify(c.mechanism, c.motion, {}).proved(), 0u);
+}
+
 TEST(Certify, TakesAnAgreementAway) {
   RunOptions options;
   options.after_judgement = [](const Prepared& prepared, Report* report) {
