@@ -68,6 +68,7 @@ std::vector<Command> WhatIsAsked(const Mechanism& m, const Motion& motion) {
     if (named.coordinate.kind == Coordinate::Kind::kOutput) candidates.push_back(std::move(named));
   }
   std::vector<Coordinate> of;
+  of.reserve(candidates.size());
   for (const NamedCoordinate& named : candidates) of.push_back(named.coordinate);
   const CoordinateChoice choice = ChooseCoordinates(m, of, of.size());
   std::vector<Command> commands;

@@ -428,7 +428,7 @@ class RangeTracer {
         other.at(r) += sign * spacing_;
         const auto at = values_.find(other);
         if (at != values_.end() && at->second.traced.ends.size() == 2) {
-          y.at(static_cast<size_t>(sign + 1)) = at->second.traced.ends[end].first;
+          y.at(sign < 0 ? 0 : 2) = at->second.traced.ends[end].first;
         }
       }
       const double sign = (end == 1) == settings_.for_all ? 1.0 : -1.0;  // a least or a largest end
@@ -494,6 +494,7 @@ class RangeTracer {
       }
       first = first && value.traced.ends.empty();
       if (space_.over() != 2) continue;
+      const ValueKey& own = key;
       ForEachArc(value, [&](const TracedArc& arc) {
         TracedArc piece{arc.bound, {}};
         const auto end_piece = [&] {
@@ -501,8 +502,8 @@ class RangeTracer {
           piece.points.clear();
         };
         for (const Vec2& p : arc.points) {
-          const bool keep = std::ranges::all_of(values_, [&, k = key](const auto& other) {
-            return other.first == k ||
+          const bool keep = std::ranges::all_of(values_, [&](const auto& other) {
+            return other.first == own ||
                    Contains(other.second.rows[RowOf(p[1])], p[0]) == settings_.for_all;
           });
           if (keep) {
