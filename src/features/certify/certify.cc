@@ -1249,13 +1249,12 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
   double open = 0.0;
   for (const SampleProof& sample : certificate.samples) open = std::max(open, sample.left_open);
   if (open > 1e-30) {
-    certificate.left_out.push_back(
-        fmt::format("loops are closed more than once: as many equations are taken as are "
-                    "independent, the others "
-                    "are off by at most {:.1e} (m or direction cosines), so far do the model's "
-                    "doubles contradict "
-                    "each other",
-                    open));
+    certificate.left_out.push_back(fmt::format(
+        "loops are closed more than once: as many equations are taken as are "
+        "independent, the others are off by at most {:.1e} (m or direction cosines); so "
+        "far do the model's doubles contradict each other, and about as much do the "
+        "values depend on which are taken",
+        open));
   }
   if (fine.reactions_open()) {
     certificate.left_out.emplace_back(
