@@ -59,13 +59,7 @@ class GroupSolver {
     const auto move = [&](const VecX& s, std::vector<Pose>* at) {
       tree_.Step(unit_.cwiseProduct(s), at);
     };
-    int stalled = 0;
-    const auto enough = [&](const internal::DampedStepMade& step) {
-      constexpr double kStalls = 1e-4;  // share of the residual that a step must win
-      const double now = step.r.norm();
-      if (step.better) stalled = now > (1.0 - kStalls) * step.before ? stalled + 1 : 0;
-      return now < kDone || stalled > 12;
-    };
+    internal::StallRule enough{.done = kDone, .share = 1e-4, .most = 12};
     const VecX r = internal::DampedSearch(kDamping, &X_FM, evaluate, move, enough);
     Closed closed{.q = start, .gap = r.norm()};
     const std::vector<Pose> X_WB = tree_.States(X_FM).X_WB;

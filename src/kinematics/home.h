@@ -96,12 +96,26 @@ struct DampedStepMade {
   bool better;    ///< else the state is where it was
 };
 
+/// Ends a search whose residual is small enough, or whose steps win little again and again.
+struct StallRule {
+  double done;   ///< residual
+  double share;  ///< of the residual that a step must win
+  int most;      ///< steps in a row that may win less
+  int stalled = 0;
+
+  bool operator()(const DampedStepMade& step) {
+    const double now = step.r.norm();
+    if (step.better) stalled = now > (1.0 - share) * step.before ? stalled + 1 : 0;
+    return now < done || stalled > most;
+  }
+};
+
 /// Makes |r(state)| small from `state` on. `evaluate(&state, &J)` gives r and its Jacobian by the
 /// scaled steps, `move(s, &state)` makes a step, `enough(DampedStepMade)` ends the search (it is
 /// asked before the first step, too). Returns the last residual.
 template <typename State, typename Evaluate, typename Move, typename Enough>
 VecX DampedSearch(const DampingRule& rule, State* state, const Evaluate& evaluate, const Move& move,
-                  const Enough& enough) {
+                  Enough&& enough) {
   MatX J;
   VecX r = evaluate(state, &J);
   constexpr double kNoStepYet = std::numeric_limits<double>::infinity();

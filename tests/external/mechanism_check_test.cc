@@ -77,7 +77,7 @@ TEST(MechanismCheck, ReportsWhatIsPerturbed) {
        "gravity: "},
       {"twice", [](Edited* m) { (*m)["bodies"][2]["name"] = (*m)["bodies"][1]["name"]; },
        "bodies[2].name: 'crank' is there twice"},
-      {"nobody", [](Edited* m) { (*m)["joints"][0]["child"]["body"] = "cranck"; },
+      {"absent", [](Edited* m) { (*m)["joints"][0]["child"]["body"] = "cranck"; },
        "joints[0].child.body: there is no body 'cranck' (did you mean 'crank'?)"},
       {"a mirror",
        [](Edited* m) {

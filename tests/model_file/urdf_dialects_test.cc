@@ -245,10 +245,10 @@ TEST(UrdfDialects, FlawsThatForcesDoNotDependOnAreTaken) {
       "robot.urdf",
       "<robot><link name='base'/>" + link("arm", "ixx='1' iyy='1' izz='3'") +
           link("point", "ixx='0' iyy='0' izz='0'") + link("rod", "ixx='0' iyy='2' izz='2'") +
-          link("held", "ixx='1' iyy='1' izz='1'") + link("led", "ixx='1' iyy='1' izz='1'") +
+          link("held", "ixx='1' iyy='1' izz='1'") + link("follower", "ixx='1' iyy='1' izz='1'") +
           "<link name='finger'/>" + joint("a", "continuous", "arm", "") +
           joint("b", "continuous", "point", "") + joint("c", "fixed", "rod", "<mimic joint='a'/>") +
-          joint("f", "continuous", "led", "<mimic joint='d' multiplier='2' offset='0.1'/>") +
+          joint("f", "continuous", "follower", "<mimic joint='d' multiplier='2' offset='0.1'/>") +
           joint("d", "continuous", "held", "<mimic joint='c' offset='0.25'/>") +
           joint("e", "continuous", "finger", "") + "</robot>"));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
@@ -267,7 +267,7 @@ TEST(UrdfDialects, FlawsThatForcesDoNotDependOnAreTaken) {
   EXPECT_EQ(m.FindBody("finger"), -1);
   for (const Body& body : m.bodies) EXPECT_TRUE(body.shapes.empty()) << body.name;
   EXPECT_NEAR(m.X_WB_home[m.FindBody("held")].linear()(0, 2), std::sin(0.25), 1e-12);
-  EXPECT_NEAR(m.X_WB_home[m.FindBody("led")].linear()(0, 2), std::sin(0.6), 1e-12);
+  EXPECT_NEAR(m.X_WB_home[m.FindBody("follower")].linear()(0, 2), std::sin(0.6), 1e-12);
   const std::string said = loaded.diagnostics.Text();
   for (const char* what :
        {"impossible inertia of arm: principal inertias 1, 1, 3 kg m² violate I1 + I2 >= I3, taken",

@@ -216,7 +216,7 @@ TEST(FrameStiffness, OfAHeldParallelogramAddsTheServo) {
   const StiffnessResult result = AtHome(held);
   ASSERT_TRUE(result.summary.ok()) << result.summary.message;
   ASSERT_EQ(result.shares.back().element, "crank (servo)");
-  // The crank's moment alone carries a force across the rods, and bends rod a as a cantilever.
+  // The crank's moment alone carries a force across the rods, and deflects rod a as a cantilever.
   const double L = 1.5;
   EXPECT_NEAR(result.shares.back().C(4, 4), L * L / 11, kAlgebra);
   EXPECT_NEAR(result.C(4, 4), L * L / 11 + L * L * L / (3 * kEIz), kAlgebra);
@@ -244,7 +244,7 @@ outputs: {block: block}
 }
 
 TEST(FrameStiffness, IsRelativeToTheOutputsReferenceBody) {
-  // Two beams on top of each other: seen from the first one's tip, only the second bends.
+  // Two beams on top of each other: seen from the first one's tip, only the second deflects.
   const std::string text = std::string("name: two") + kHeader + R"(
 bodies:
   one: {frames: {tip: [2, 0, 0]}, beams: {b: {to: tip, section: s, material: m, z: z}}}

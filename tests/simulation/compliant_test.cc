@@ -204,7 +204,7 @@ TEST(CompliantSimulation, ParallelogramCarriesBendingOutOfItsPlaneThroughAllFour
   ASSERT_TRUE(run.result.summary.ok()) << run.result.summary.message;
   const Section s = TestSection();
   const Mat6& K = run.result.K;
-  // In the plane: a locked crank bends, the other one swings; both are struts along y.
+  // In the plane: a locked crank deflects, the other one swings; both are struts along y.
   EXPECT_NEAR(run.result.C(3, 3) * 3 * kE * s.I_z / (L * L * L), 1.0, 10 * kMeasured);
   EXPECT_NEAR(K(4, 4) * L / (2 * kE * s.area), 1.0, 10 * kMeasured);
   EXPECT_NEAR(K(2, 2) * L / (2 * kE * s.area * d * d / 4), 1.0, 10 * kMeasured);
@@ -240,7 +240,7 @@ TEST(CompliantSimulation, TheAngleOfAServoDoesNotRoundSmallLoadsAway) {
   const CompliantRun run = Simulated(m);
   ASSERT_TRUE(run.result.summary.ok()) << run.result.summary.message;
   EXPECT_LT(run.residual, 1e-10);
-  // The arm bends; the cranks stretch and let the coupler turn about its middle, 0.35 m away.
+  // The arm deflects; the cranks stretch and let the coupler turn about its middle, 0.35 m away.
   const double bending = 0.2 * 0.2 * 0.2 / (3 * kE * 5e-13);
   const double cranks = 0.4 / (2 * kE * TestSection().area) * (1 + std::pow(0.35 / 0.15, 2));
   EXPECT_NEAR(run.result.C(4, 4) / (bending + cranks), 1.0, 1e-8);

@@ -537,11 +537,11 @@ const char* const kHand =
 <asset><mesh file="tip.obj"/></asset>
 <worldbody><body name="wrist" childclass="finger"><body name="palm" pos="0 0 0.1" euler="30 40 50">
 <joint name="yaw" axis="0 0 1"/><geom type="box" size="0.1 0.2 0.3"/>
-<body name="thumb" pos="0.1 0 0"><joint name="bend" class="main" ref="10"/><geom size="0.1"/><site name="pad" euler="0 90 90"/>
+<body name="thumb" pos="0.1 0 0"><joint name="flex" class="main" ref="10"/><geom size="0.1"/><site name="pad" euler="0 90 90"/>
 <geom type="mesh" mesh="tip" mass="0"/></body>
 <body name="slider" pos="0 0 0.2"><joint name="out" type="slide" range="-0.1 0.2"/><geom size="0.1"/></body></body></body></worldbody>
-<tendon><fixed name="sum"><joint joint="yaw" coef="1"/><joint joint="bend" coef="2"/></fixed></tendon>
-<equality><joint name="gear" joint1="bend" joint2="yaw" polycoef="0 2 0 0 0"/><tendon name="held" tendon1="sum"/>
+<tendon><fixed name="sum"><joint joint="yaw" coef="1"/><joint joint="flex" coef="2"/></fixed></tendon>
+<equality><joint name="gear" joint1="flex" joint2="yaw" polycoef="0 2 0 0 0"/><tendon name="held" tendon1="sum"/>
 <connect name="outside" body1="palm" body2="wrist" anchor="0 0 0"/></equality>
 <actuator><motor name="m" joint="out" class="finger"/></actuator>
 <keyframe><key name="grip" qpos="0.1 0.2 0.15"/></keyframe></mujoco>)";
@@ -671,7 +671,7 @@ TEST(ForeignMjcf, AttachedModelsKeepTheirClassesUnitsAndKeyframes) {
 <body name="first" pos="0 0 0.1" axisangle="0 0 1 0.5235987755982988"><body name="second" axisangle="0 1 0 0.6981317007977318">
 <body name="l_palm" axisangle="1 0 0 0.8726646259971648"><joint name="l_yaw" axis="0 0 1" damping="0.3" limited="true"
  range="-0.5235987755982988 1.0471975511965976"/><geom type="box" size="0.1 0.2 0.3" density="500" contype="0" conaffinity="0"/>
-<body name="l_thumb" pos="0.1 0 0"><joint name="l_bend" damping="0.2" limited="true" ref="0.17453292519943295"
+<body name="l_thumb" pos="0.1 0 0"><joint name="l_flex" damping="0.2" limited="true" ref="0.17453292519943295"
  range="-1.5707963267948966 0.7853981633974483"/><geom size="0.1" density="500" contype="0" conaffinity="0"/>
 <body name="padded" axisangle="0 1 0 1.5707963267948966"><site name="l_pad" axisangle="1 0 0 1.5707963267948966"/></body></body>
 <body name="l_slider" pos="0 0 0.2"><joint name="l_out" type="slide" damping="0.3" limited="true" range="-0.1 0.2"/>
@@ -700,7 +700,7 @@ TEST(ForeignMjcf, AttachedModelsKeepTheirClassesUnitsAndKeyframes) {
       n.joints[n.FindJoint("turned_fixed")].X_PF * n.joints[n.FindJoint("first_fixed")].X_PF *
       n.joints[n.FindJoint("second_fixed")].X_PF * n.joints[n.FindJoint("l_yaw")].X_PF;
   EXPECT_TRUE(m.joints[m.FindJoint("l_yaw")].X_PF.isApprox(X_palm, 1e-9));
-  for (const char* name : {"A", "l_yaw", "l_bend", "l_out"}) {
+  for (const char* name : {"A", "l_yaw", "l_flex", "l_out"}) {
     const Joint &x = m.joints[m.FindJoint(name)], &y = n.joints[n.FindJoint(name)];
     EXPECT_NEAR(x.range[0].lower, y.range[0].lower, 1e-12) << name;
     EXPECT_NEAR(x.range[0].upper, y.range[0].upper, 1e-12) << name;
@@ -721,7 +721,7 @@ TEST(ForeignMjcf, AttachedModelsKeepTheirClassesUnitsAndKeyframes) {
   EXPECT_EQ(std::ranges::count_if(m.joints, &Joint::closure), 0);
   ASSERT_EQ(m.drives.size(), 3u);
   EXPECT_NEAR(m.joints[m.FindJoint("l_yaw")].home[0], 0.1, 1e-12);
-  EXPECT_NEAR(m.joints[m.FindJoint("l_bend")].home[0], 0.2 - std::numbers::pi / 18.0, 1e-12);
+  EXPECT_NEAR(m.joints[m.FindJoint("l_flex")].home[0], 0.2 - std::numbers::pi / 18.0, 1e-12);
   EXPECT_NEAR(m.joints[m.FindJoint("l_out")].home[0], 0.15, 1e-12);
   EXPECT_NE(said.find("keyframe 'l_grip'"), std::string::npos) << said;
   EXPECT_NE(said.find("<connect> 'outside' is not attached"), std::string::npos) << said;

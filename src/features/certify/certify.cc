@@ -143,7 +143,7 @@ class ProvedSystem {
     std::vector<T> x(b.size(), T(0)), residual(b.size());
     VecX reached;
     double last = kInfinity;
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0;; ++k) {
       for (size_t i = 0; i < b.size(); ++i) {
         residual[i] = -b[i];
         for (const Entry& entry : rows_[i]) {
@@ -152,19 +152,11 @@ class ProvedSystem {
       }
       reached = Reached(residual);
       const double now = reached.size() == 0 ? 0.0 : reached.maxCoeff();
-      if (!(now < 0.5 * last)) break;
+      if (!(now < 0.5 * last) || now == 0.0 || k == 12) break;
       last = now;
-      if (now == 0.0) break;
       Correct(residual, &x);
     }
-    // Of the last x.
-    for (size_t i = 0; i < b.size(); ++i) {
-      residual[i] = -b[i];
-      for (const Entry& entry : rows_[i]) {
-        residual[i] += entry.value * x[static_cast<size_t>(entry.column)];
-      }
-    }
-    const VecX errors = Errors(Reached(residual));
+    const VecX errors = Errors(reached);
     for (size_t i = 0; i < x.size(); ++i) {
       x[i] = Widened(x[i], i, errors[static_cast<Eigen::Index>(i)]);
     }

@@ -20,6 +20,14 @@ std::array<Vector<T>, 3> Basis(const Joint& joint) {
   return {e1, Cross(a, e1), a};
 }
 
+// Of the k-th length among a joint's coordinates.
+template <typename T>
+Vector<T> SlideAxis(const Joint& joint, const std::array<Vector<T>, 3>& E, size_t k) {
+  if (joint.kind == JointKind::kFree) return Axis<T>(k);
+  const bool plane = joint.kind == JointKind::kPlanar || joint.kind == JointKind::kPointOnPlane;
+  return E[plane ? k : 2];
+}
+
 }  // namespace
 
 template <typename T>
@@ -63,10 +71,7 @@ Model<T>::Model(const Mechanism& mechanism) : mechanism_(mechanism), spins_(Idle
       lengths_.push_back(slides);
       if (slides) {
         const auto k = static_cast<size_t>(slide++);
-        step.axis = joint.kind == JointKind::kFree ? Axis<T>(k)
-                    : joint.kind == JointKind::kPlanar || joint.kind == JointKind::kPointOnPlane
-                        ? E[k]
-                        : E[2];
+        step.axis = SlideAxis(joint, E, k);
       } else if (ball) {
         step.axis = Axis<T>(static_cast<size_t>(turn++));
         tree.ball = true;
@@ -163,10 +168,7 @@ Scalar<T> Model<T>::JointScalar(size_t j, int coordinate) const {
   scalar.frames = joint_pair_[j];
   scalar.length = IsLength(joint.kind, coordinate);
   if (scalar.length) {
-    const auto k = static_cast<size_t>(coordinate);
-    scalar.f = joint.kind == JointKind::kFree ? Axis<T>(k)
-               : joint.kind == JointKind::kPlanar || joint.kind == JointKind::kPointOnPlane ? E[k]
-                                                                                            : E[2];
+    scalar.f = SlideAxis(joint, E, static_cast<size_t>(coordinate));
   } else if (IsOfBall(joint.kind, coordinate)) {
     constexpr std::array kinds = {Kind::kRoll, Kind::kPitch, Kind::kYaw};
     scalar.kind = kinds[static_cast<size_t>(BallAxis(joint.kind, coordinate))];

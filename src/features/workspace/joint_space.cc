@@ -153,22 +153,13 @@ class FoldTracer {
   // Between at and at + step (f₁ there) to f = 0 (Illinois).
   [[nodiscard]] bool Across(const PlacedPose& at, const Eigen::Vector2d& step, double f1,
                             PlacedPose* to) const {
-    double a = 0.0, f_a = at.type1, b = 1.0, f_b = f1;
-    for (int i = 0; i < 60; ++i) {
-      const double c = i % 16 == 15 ? 0.5 * (a + b) : b - f_b * (b - a) / (f_b - f_a);
+    const auto value = [&](double c, double* f) {
       if (!space_.Step(at, c * step, to)) return false;
-      const double f_c = to->type1;
-      if (std::abs(f_c) < kOnFold) return true;
-      if ((f_c < 0.0) != (f_b < 0.0)) {
-        a = b;
-        f_a = f_b;
-      } else {
-        f_a *= 0.5;
-      }
-      b = c;
-      f_b = f_c;
-    }
-    return false;
+      *f = to->type1;
+      return true;
+    };
+    return FindCrossing(0.0, at.type1, 1.0, f1, value,
+                        [](double f, double /*width*/) { return std::abs(f) < kOnFold; });
   }
 
   PoseSpace space_;

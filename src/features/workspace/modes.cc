@@ -93,13 +93,7 @@ class ModeSearch {
     const auto move = [&](const VecX& s, std::vector<Pose>* at) {
       tree_.Step(unit_.cwiseProduct(s), at);
     };
-    int stalled = 0;
-    const auto enough = [&](const internal::DampedStepMade& step) {
-      constexpr double kStalls = 1e-3;  // share of the residual that a step must win
-      const double now = step.r.norm();
-      if (step.better) stalled = now > (1.0 - kStalls) * step.before ? stalled + 1 : 0;
-      return now < kModeClosed || stalled > 8;
-    };
+    internal::StallRule enough{.done = kModeClosed, .share = 1e-3, .most = 8};
     constexpr internal::DampingRule kDamping{.most_steps = 120,
                                              .largest_step = 0.7,
                                              .first = 1e-2,
@@ -291,24 +285,18 @@ class CurveSearch {
   }
   // The pose where the miss vanishes (Illinois).
   bool Between(const PlacedPose& at, double step, double f_a, double f_b, PlacedPose* to) const {
-    double a = 0.0, b = step;
     const double tolerance = 1e-13 * space_.UnitOf(0);
-    for (int i = 0; i < 60; ++i) {
-      double c = b - f_b * (b - a) / (f_b - f_a);
-      if (!std::isfinite(c) || i % 16 == 15) c = 0.5 * (a + b);
-      if (!space_.Step(at, VecX::Constant(1, c), to)) return false;
-      const double f_c = Miss(*to);
-      if (std::abs(f_c) < tolerance || std::abs(b - a) < 1e-15) return true;
-      if ((f_c < 0.0) != (f_b < 0.0)) {
-        a = b;
-        f_a = f_b;
-      } else {
-        f_a *= 0.5;
-      }
-      b = c;
-      f_b = f_c;
-    }
-    return true;
+    bool reached = true;
+    const auto miss = [&](double c, double* f) {
+      reached = space_.Step(at, VecX::Constant(1, c), to);
+      *f = reached ? Miss(*to) : 0.0;
+      return reached;
+    };
+    // What is as near as rounding lets it come counts, too.
+    return FindCrossing(
+               0.0, f_a, step, f_b, miss,
+               [&](double f, double width) { return std::abs(f) < tolerance || width < 1e-15; }) ||
+           reached;
   }
   [[nodiscard]] bool Same(const PlacedPose& a, const PlacedPose& b) const {
     double most = 0.0;

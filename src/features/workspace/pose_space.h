@@ -24,6 +24,30 @@
 
 namespace mbv {
 
+/// A root of f between a and b, where it has other signs (the Illinois rule, now and then the
+/// middle). `f(c, &f_c)` is false where it has no value: so is this then, and after sixty values;
+/// `enough(f_c, width)` ends the search, at the value asked for last.
+template <typename Function, typename Enough>
+[[nodiscard]] bool FindCrossing(double a, double f_a, double b, double f_b, const Function& f,
+                                const Enough& enough) {
+  for (int i = 0; i < 60; ++i) {
+    double c = b - f_b * (b - a) / (f_b - f_a);
+    if (!std::isfinite(c) || i % 16 == 15) c = 0.5 * (a + b);
+    double f_c = 0.0;
+    if (!f(c, &f_c)) return false;
+    if (enough(f_c, std::abs(b - a))) return true;
+    if ((f_c < 0.0) != (f_b < 0.0)) {
+      a = b;
+      f_a = f_b;
+    } else {
+      f_a *= 0.5;
+    }
+    b = c;
+    f_b = f_c;
+  }
+  return false;
+}
+
 /// What may end a set of poses: its margin is positive inside, zero there [SI, or 1].
 struct SetBound {
   enum class Kind { kDrive, kJoint, kCone, kBox, kConstraint, kType1, kType2 };

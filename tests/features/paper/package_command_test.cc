@@ -118,12 +118,11 @@ TEST(PackageCommand, FilesWithoutAFolderInCommonAreRefused) {
   const Program mbverify("package_apart");
   const std::string folder = mbverify.folder().string();
   const ProgramResult made = mbverify.Script(
-      "mkdir -p " + folder + "/people/jane " + folder + "/other && cp -r models/four_bar " +
-      folder +
+      "mkdir -p " + folder + "/users/jane " + folder + "/other && cp -r models/four_bar " + folder +
       "/other/ && sed 's,mechanism: .*,mechanism: ../../other/four_bar/model.yaml,' "
       "scenarios/four_bar/turn_inverse.yaml >" +
-      folder + "/people/jane/my.yaml && cd " + folder + "/people/jane && HOME=" + folder +
-      "/people/jane \"$mbverify\" package my.yaml -o paper.zip");
+      folder + "/users/jane/my.yaml && cd " + folder + "/users/jane && HOME=" + folder +
+      "/users/jane \"$mbverify\" package my.yaml -o paper.zip");
   EXPECT_EQ(made.exit_code, 2);
   EXPECT_TRUE(Has(made.err, "lies in no folder with")) << made.err;
 }

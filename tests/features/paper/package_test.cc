@@ -11,12 +11,12 @@ namespace mbv {
 namespace {
 
 TEST(LineNaming, FindsAFolderButNoPartOfAnotherName) {
-  EXPECT_EQ(LineNaming("a: 1\nb: /people/jane/x.csv\n", "/people/jane"), 2);
-  EXPECT_EQ(LineNaming("\"/people/jane\"", "/people/jane"), 1);
-  EXPECT_EQ(LineNaming("/people/janet/x", "/people/jane"), 0);
-  EXPECT_EQ(LineNaming("package/people/jane-x and data/people/jane", "/people/jane"), 0);
-  EXPECT_EQ(LineNaming("/people/janet\n\n/people/jane", "/people/jane"), 3);
-  EXPECT_EQ(LineNaming("", "/people/jane"), 0);
+  EXPECT_EQ(LineNaming("a: 1\nb: /users/jane/x.csv\n", "/users/jane"), 2);
+  EXPECT_EQ(LineNaming("\"/users/jane\"", "/users/jane"), 1);
+  EXPECT_EQ(LineNaming("/users/janet/x", "/users/jane"), 0);
+  EXPECT_EQ(LineNaming("package/users/jane-x and data/users/jane", "/users/jane"), 0);
+  EXPECT_EQ(LineNaming("/users/janet\n\n/users/jane", "/users/jane"), 3);
+  EXPECT_EQ(LineNaming("", "/users/jane"), 0);
 }
 
 // Results of a packed motion against their repetition, as files.

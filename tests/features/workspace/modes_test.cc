@@ -107,12 +107,23 @@ std::vector<Solution> SolveByPhc(const std::vector<Polynomial>& equations) {
   }
   return solutions;
 }
+// |q|² times the rotation of a quaternion.
+std::array<std::array<Polynomial, 3>, 3> TurnedBy(const Polynomial& q0, const Polynomial& q1,
+                                                  const Polynomial& q2, const Polynomial& q3) {
+  return {{{Square(q0) + Square(q1) - Square(q2) - Square(q3), 2 * (q1 * q2 - q0 * q3),
+            2 * (q1 * q3 + q0 * q2)},
+           {2 * (q1 * q2 + q0 * q3), Square(q0) - Square(q1) + Square(q2) - Square(q3),
+            2 * (q2 * q3 - q0 * q1)},
+           {2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1),
+            Square(q0) - Square(q1) - Square(q2) + Square(q3)}}};
+}
 bool IsReal(const Solution& solution) {
   return std::ranges::all_of(solution,
                              [](const auto& v) { return std::abs(v.second.imag()) < 1e-7; });
 }
-#define MBV_NEEDS_PHC() \
-  if (std::system("command -v phc > /dev/null") != 0) GTEST_SKIP() << "phc is not installed"
+#define MBV_NEEDS_PHC()                                   \
+  ASSERT_EQ(std::system("command -v phc > /dev/null"), 0) \
+      << "scripts/setup --tests installs phcpack"
 
 Mechanism FromModelText(const std::string& text) {
   LoadResult result = LoadModelText(text, "modes.yaml");
@@ -254,13 +265,7 @@ struct Hexapod {
                                          2 * (q0 * g2 - g0 * q2 - q3 * g1 + q1 * g3),
                                          2 * (q0 * g3 - g0 * q3 - q1 * g2 + q2 * g1)};
     const Polynomial n = Square(q0) + Square(q1) + Square(q2) + Square(q3);
-    const std::array<std::array<Polynomial, 3>, 3> R = {
-        {{Square(q0) + Square(q1) - Square(q2) - Square(q3), 2 * (q1 * q2 - q0 * q3),
-          2 * (q1 * q3 + q0 * q2)},
-         {2 * (q1 * q2 + q0 * q3), Square(q0) - Square(q1) + Square(q2) - Square(q3),
-          2 * (q2 * q3 - q0 * q1)},
-         {2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1),
-          Square(q0) - Square(q1) - Square(q2) + Square(q3)}}};
+    const std::array<std::array<Polynomial, 3>, 3> R = TurnedBy(q0, q1, q2, q3);
     std::vector<Polynomial> equations;
     for (size_t i = 0; i < 6; ++i) {
       const Vec3 &a = base.at(i), &b = top.at(i);
@@ -406,13 +411,7 @@ TEST(Modes, ASphericalWristHasThoseOfItsPolynomials) {
   std::array<Polynomial, 4> q;
   for (size_t k = 0; k < 4; ++k) q.at(k) = Polynomial("q" + std::to_string(k));
   const auto& [q0, q1, q2, q3] = q;
-  const std::array<std::array<Polynomial, 3>, 3> R = {
-      {{Square(q0) + Square(q1) - Square(q2) - Square(q3), 2 * (q1 * q2 - q0 * q3),
-        2 * (q1 * q3 + q0 * q2)},
-       {2 * (q1 * q2 + q0 * q3), Square(q0) - Square(q1) + Square(q2) - Square(q3),
-        2 * (q2 * q3 - q0 * q1)},
-       {2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1),
-        Square(q0) - Square(q1) - Square(q2) + Square(q3)}}};
+  const std::array<std::array<Polynomial, 3>, 3> R = TurnedBy(q0, q1, q2, q3);
   std::vector<Polynomial> equations = {0.81 * q0 + 0.63 * q1 - 0.47 * q2 + 0.93 * q3 - 1.0};
   for (size_t i = 0; i < 3; ++i) {
     const Vec3 turned = Mat3(Eigen::AngleAxisd(drives_at[i], u.at(i))) * w.at(i);

@@ -103,17 +103,22 @@ def _set(values):
     return arguments
 
 
-class Result:
+class _Result:
+    def __init__(self, summary, folder, keep, text):
+        self.summary = summary
+        self.folder = folder
+        self.text = text
+        self._keep = keep
+
+
+class Result(_Result):
     """What `mbverify run` says of one scenario.
 
     `summary` is its summary.json (docs/reference/json.md), `folder` the folder with its files.
     """
 
     def __init__(self, summary, folder, keep, text, draw=lambda: None):
-        self.summary = summary
-        self.folder = folder
-        self.text = text
-        self._keep = keep
+        super().__init__(summary, folder, keep, text)
         self._traces = None
         self._draw = functools.cache(draw)
 
@@ -228,14 +233,8 @@ def audit(model=None):
     return _call("audit", *([model] if model else []))[0]
 
 
-class StudyResult:
+class StudyResult(_Result):
     """What `mbverify study` says: `summary` is its summary.json, `folder` has its files."""
-
-    def __init__(self, summary, folder, keep, text):
-        self.summary = summary
-        self.folder = folder
-        self.text = text
-        self._keep = keep
 
     @property
     def quantities(self):
@@ -260,15 +259,9 @@ def study(file, *, count=None, seed=None, jobs=None, out=None, progress=False):
     return StudyResult(document, folder.path / document["study"], folder, text)
 
 
-class WorkspaceResult:
+class WorkspaceResult(_Result):
     """What `mbverify workspace` says of a reachable set: `summary` is its JSON, `folder` has its
     files. SI units and radians."""
-
-    def __init__(self, summary, folder, keep, text):
-        self.summary = summary
-        self.folder = folder
-        self.text = text
-        self._keep = keep
 
     @property
     def agrees(self):
