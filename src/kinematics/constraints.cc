@@ -22,6 +22,30 @@ using internal::Cosine;
 using internal::FramePair;
 using internal::MakePair;
 using internal::PairScalar;
+using internal::VariedPair;
+using internal::VariedScalar;
+
+// What frames between two bodies are made by: their pair, or its variation.
+struct Here {
+  const BodyStates& states;
+  bool biases = true;
+  [[nodiscard]] FramePair Between(int parent, const Pose& X_PF, int child, const Pose& X_CM) const {
+    return MakePair(states, parent, X_PF, child, X_CM, biases);
+  }
+};
+struct Varied {
+  const BodyStates& states;
+  const std::vector<Vec6>& by;
+  [[nodiscard]] VariedPair Between(int parent, const Pose& X_PF, int child,
+                                   const Pose& X_CM) const {
+    return MakePair(states, by, parent, X_PF, child, X_CM);
+  }
+};
+const PairScalar& Asked(const PairScalar& scalar) { return scalar; }
+const PairScalar& Asked(const VariedScalar& scalar) { return scalar.by; }
+// Of a constant.
+double Offset(const Here& /*frames*/, double offset) { return offset; }
+double Offset(const Varied& /*frames*/, double /*offset*/) { return 0.0; }
 
 // Collects scalars as rows; `offset` is what the scalar should be.
 class RowWriter {
@@ -52,13 +76,15 @@ class RowWriter {
   ConstraintRows& rows_;
 };
 
-ScalarRow ToRow(const PairScalar& scalar, int parent, int child) {
+template <typename Scalar>
+ScalarRow ToRow(const Scalar& scalar, int parent, int child) {
+  const PairScalar& asked = Asked(scalar);
   return {.parent = parent,
           .child = child,
-          .value = scalar.value,
-          .J_parent = scalar.J_parent,
-          .J_child = scalar.J_child,
-          .bias = scalar.bias};
+          .value = asked.value,
+          .J_parent = asked.J_parent,
+          .J_child = asked.J_child,
+          .bias = asked.bias};
 }
 
 void TurnNear(double near_value, double* angle) {
@@ -68,31 +94,64 @@ void TurnNear(double near_value, double* angle) {
 
 Pose At(const Vec3& point) { return Pose(Eigen::Translation3d(point)); }
 
-}  // namespace
-
-ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions, bool biases) {
-  const FramePair pair =
-      MakePair(states, joint.parent, joint.X_PF, joint.child, joint.X_CM, biases);
+template <typename Frames>
+ConstraintRows RowsBy(const Joint& joint, const Frames& frames, bool reactions) {
+  const auto pair = frames.Between(joint.parent, joint.X_PF, joint.child, joint.X_CM);
   ConstraintRows rows;
   rows.parent = joint.parent;
   rows.child = joint.child;
   RowWriter out(&rows);
   Mat3 directions;
   const int locked = LockedDirections(joint, &directions);
-  for (int i = 0; i < locked; ++i) out.Translation(Along(pair, directions.col(i)));
+  for (int i = 0; i < locked; ++i) out.Translation(Asked(Along(pair, directions.col(i))));
   if (reactions && joint.transmits_force_only) return rows;
   std::array<LockedCosine, 3> cosines;
   const int turns = LockedCosines(joint, &cosines);
-  for (int i = 0; i < turns; ++i)
-    out.Add(Cosine(pair, cosines[i].f_F, cosines[i].m_M), cosines[i].value);
+  for (int i = 0; i < turns; ++i) {
+    out.Add(Asked(Cosine(pair, cosines[i].f_F, cosines[i].m_M)), Offset(frames, cosines[i].value));
+  }
   return rows;
+}
+
+template <typename Frames>
+ScalarRow JointRowBy(const Joint& joint, int coordinate, const Frames& frames) {
+  const auto pair = frames.Between(joint.parent, joint.X_PF, joint.child, joint.X_CM);
+  return ToRow(internal::CoordinateBetween(joint, coordinate, pair), joint.parent, joint.child);
+}
+
+template <typename Frames>
+ScalarRow LegRowBy(const DistanceDrive& leg, const Frames& frames) {
+  const auto pair = frames.Between(leg.body_from, At(leg.p_from), leg.body_to, At(leg.p_to));
+  return ToRow(Distance(pair), leg.body_from, leg.body_to);
+}
+
+template <typename Frames>
+ScalarRow OutputRowBy(const Output& output, int component, const Frames& frames) {
+  MBV_DEMAND(component >= 0 && component < 6, component);
+  const auto pair = frames.Between(output.reference_body, output.X_RbR, output.body, output.X_BO);
+  return ToRow(
+      component < 3 ? Along(pair, Vec3::Unit(component)) : RollPitchYaw(pair, component - 3),
+      output.reference_body, output.body);
+}
+
+template <typename Frames>
+ScalarRow BushingRowBy(const Bushing& bushing, int coordinate, const Frames& frames) {
+  MBV_DEMAND(coordinate >= 0 && coordinate < 6, coordinate);
+  const auto pair = frames.Between(bushing.parent, bushing.X_PF, bushing.child, bushing.X_CM);
+  return ToRow(
+      coordinate < 3 ? Along(pair, Vec3::Unit(coordinate)) : RotationVector(pair, coordinate - 3),
+      bushing.parent, bushing.child);
+}
+
+}  // namespace
+
+ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions, bool biases) {
+  return RowsBy(joint, Here{states, biases}, reactions);
 }
 
 ScalarRow JointCoordinateRow(const Joint& joint, int coordinate, const BodyStates& states,
                              double near_value) {
-  const FramePair pair = MakePair(states, joint.parent, joint.X_PF, joint.child, joint.X_CM);
-  ScalarRow row =
-      ToRow(internal::JointCoordinate(joint, coordinate, pair), joint.parent, joint.child);
+  ScalarRow row = JointRowBy(joint, coordinate, Here{states});
   if (!IsLength(joint.kind, coordinate)) TurnNear(near_value, &row.value);
   return row;
 }
@@ -103,32 +162,18 @@ ScalarRow DriveRow(const Mechanism& mechanism, const Drive& drive, const BodySta
     return JointCoordinateRow(mechanism.joints[on_joint->joint], on_joint->coordinate, states,
                               near_value);
   }
-  const auto& leg = std::get<DistanceDrive>(drive.kind);
-  const FramePair pair = MakePair(states, leg.body_from, At(leg.p_from), leg.body_to, At(leg.p_to));
-  return ToRow(internal::Distance(pair), leg.body_from, leg.body_to);
+  return LegRowBy(std::get<DistanceDrive>(drive.kind), Here{states});
 }
 
 ScalarRow OutputRow(const Output& output, int component, const BodyStates& states,
                     double near_value) {
-  const FramePair pair =
-      MakePair(states, output.reference_body, output.X_RbR, output.body, output.X_BO);
-  MBV_DEMAND(component >= 0 && component < 6, component);
-  if (component < 3) {
-    return ToRow(Along(pair, Vec3::Unit(component)), output.reference_body, output.body);
-  }
-  ScalarRow row =
-      ToRow(internal::RollPitchYaw(pair, component - 3), output.reference_body, output.body);
-  TurnNear(near_value, &row.value);
+  ScalarRow row = OutputRowBy(output, component, Here{states});
+  if (component >= 3) TurnNear(near_value, &row.value);
   return row;
 }
 
 ScalarRow BushingRow(const Bushing& bushing, int coordinate, const BodyStates& states) {
-  const FramePair pair =
-      MakePair(states, bushing.parent, bushing.X_PF, bushing.child, bushing.X_CM);
-  MBV_DEMAND(coordinate >= 0 && coordinate < 6, coordinate);
-  return ToRow(coordinate < 3 ? Along(pair, Vec3::Unit(coordinate))
-                              : internal::RotationVector(pair, coordinate - 3),
-               bushing.parent, bushing.child);
+  return BushingRowBy(bushing, coordinate, Here{states});
 }
 
 ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate,
@@ -151,14 +196,15 @@ ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate
 
 namespace {
 
-// P(q) without constant, P′ and P″ by Horner's rule.
+// P(q) without constant, P′, P″ and P‴ by Horner's rule.
 struct PolynomialJet {
-  double value = 0.0, slope = 0.0, curvature = 0.0;
+  double value = 0.0, slope = 0.0, curvature = 0.0, third = 0.0;
 };
 
 PolynomialJet PolynomialAt(const std::vector<double>& coefficients, double q) {
   PolynomialJet at;
   for (size_t i = coefficients.size(); i-- > 0;) {
+    at.third = at.third * q + 3.0 * at.curvature;
     at.curvature = at.curvature * q + 2.0 * at.slope;
     at.slope = at.slope * q + at.value;
     at.value = at.value * q + coefficients[i];
@@ -166,7 +212,8 @@ PolynomialJet PolynomialAt(const std::vector<double>& coefficients, double q) {
   // So far of P(q)/q.
   return {.value = at.value * q,
           .slope = at.slope * q + at.value,
-          .curvature = at.curvature * q + 2.0 * at.slope};
+          .curvature = at.curvature * q + 2.0 * at.slope,
+          .third = at.third * q + 3.0 * at.curvature};
 }
 
 // `near`: per term a value within half a turn.
@@ -411,6 +458,88 @@ void PredictTurns(const Mechanism& mechanism, double dt_s, BodyStates* states) {
       ++at;
     }
   }
+}
+
+ConstraintRows VariedRowsOf(const Joint& joint, const BodyStates& states,
+                            const std::vector<Vec6>& by, bool reactions) {
+  return RowsBy(joint, Varied{states, by}, reactions);
+}
+
+ScalarRow VariedDriveRow(const Mechanism& mechanism, const Drive& drive, const BodyStates& states,
+                         const std::vector<Vec6>& by) {
+  if (const auto* on = std::get_if<JointDrive>(&drive.kind)) {
+    return JointRowBy(mechanism.joints[on->joint], on->coordinate, Varied{states, by});
+  }
+  return LegRowBy(std::get<DistanceDrive>(drive.kind), Varied{states, by});
+}
+
+ScalarRow VariedRow(const Mechanism& mechanism, const Coordinate& coordinate,
+                    const BodyStates& states, const std::vector<Vec6>& by) {
+  const Varied frames{states, by};
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kPrescribed:
+      return JointRowBy(mechanism.joints[mechanism.prescribed[coordinate.index].joint], 0, frames);
+    case Coordinate::Kind::kDrive:
+      return VariedDriveRow(mechanism, mechanism.drives[coordinate.index], states, by);
+    case Coordinate::Kind::kOutput:
+      return OutputRowBy(mechanism.outputs[coordinate.index], coordinate.component, frames);
+    case Coordinate::Kind::kJoint:
+      return JointRowBy(mechanism.joints[coordinate.index], coordinate.component, frames);
+  }
+  ThrowDemand("known coordinate kind", __FILE__, __LINE__, "?");
+}
+
+std::vector<CouplingRow> VariedCouplingRows(const Mechanism& mechanism, const BodyStates& states,
+                                            const std::vector<Vec6>& by) {
+  std::vector<CouplingRow> rows;
+  size_t at = 0;
+  for (const Coupling& coupling : mechanism.couplings) {
+    CouplingRow& out = rows.emplace_back();
+    out.angular = true;
+    for (const Coupling::Term& term : coupling.terms) {
+      const Joint& joint = mechanism.joints[term.joint];
+      const double near = states.coupled.empty() ? joint.home[term.coordinate] : states.coupled[at];
+      ++at;
+      const ScalarRow row = JointCoordinateRow(joint, term.coordinate, states, near);
+      ScalarRow varied = JointRowBy(joint, term.coordinate, Varied{states, by});
+      const PolynomialJet P = PolynomialAt(term.polynomial, row.value);
+      const double rate = RateOf(row, states.V_WB), moved = varied.value;
+      varied.bias = P.slope * varied.bias + P.curvature * moved * row.bias +
+                    P.third * moved * rate * rate +
+                    2.0 * P.curvature * rate * RateOf(varied, states.V_WB);
+      varied.J_parent = P.slope * varied.J_parent + P.curvature * moved * row.J_parent;
+      varied.J_child = P.slope * varied.J_child + P.curvature * moved * row.J_child;
+      varied.value = P.slope * moved;
+      out.value += varied.value;
+      out.angular = out.angular && !IsLength(joint.kind, term.coordinate);
+      out.pieces.push_back(varied);
+    }
+  }
+  return rows;
+}
+
+ScalarRow VariedElementRow(const Mechanism& mechanism, size_t e, const BodyStates& states,
+                           const std::vector<Vec6>& by) {
+  const ForceElement& element = mechanism.elements[e];
+  if (element.drive >= 0) {
+    return VariedDriveRow(mechanism, mechanism.drives[static_cast<size_t>(element.drive)], states,
+                          by);
+  }
+  if (element.bushing >= 0) {
+    return BushingRowBy(mechanism.bushings[static_cast<size_t>(element.bushing)],
+                        element.coordinate, Varied{states, by});
+  }
+  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  if (!IsOfBall(joint.kind, element.coordinate)) {
+    return JointRowBy(joint, element.coordinate, Varied{states, by});
+  }
+  ScalarRow row = BallRow(joint, element.coordinate, states);
+  const auto p = static_cast<size_t>(row.parent), c = static_cast<size_t>(row.child);
+  const Vec3 a = by[c].head<3>().cross(row.J_child.head<3>());
+  row.bias = a.dot(states.V_WB[c].head<3>().cross(states.V_WB[p].head<3>()));
+  row.J_parent.head<3>() = -a;
+  row.J_child.head<3>() = a;
+  return row;
 }
 
 namespace {

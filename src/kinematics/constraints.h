@@ -137,6 +137,28 @@ void PredictTurns(const Mechanism& mechanism, double dt_s, BodyStates* states);
   return row;
 }
 
+// First variations of rows (internal::VariedPair) where the poses are moved by the small twists
+// `by`, per body, and velocities stay: `value`, J and `bias` are δr, δJ and δb.
+
+[[nodiscard]] ConstraintRows VariedRowsOf(const Joint& joint, const BodyStates& states,
+                                          const std::vector<Vec6>& by, bool reactions);
+[[nodiscard]] ScalarRow VariedRow(const Mechanism& mechanism, const Coordinate& coordinate,
+                                  const BodyStates& states, const std::vector<Vec6>& by);
+[[nodiscard]] ScalarRow VariedDriveRow(const Mechanism& mechanism, const Drive& drive,
+                                       const BodyStates& states, const std::vector<Vec6>& by);
+[[nodiscard]] std::vector<CouplingRow> VariedCouplingRows(const Mechanism& mechanism,
+                                                          const BodyStates& states,
+                                                          const std::vector<Vec6>& by);
+[[nodiscard]] ScalarRow VariedElementRow(const Mechanism& mechanism, size_t element,
+                                         const BodyStates& states, const std::vector<Vec6>& by);
+[[nodiscard]] inline ScalarRow VariedIdleRow(const Spin& spin, const BodyStates& states,
+                                             const std::vector<Vec6>& by) {
+  ScalarRow row = IdleRow(spin, states);
+  const Vec3 n = row.J_child.head<3>();
+  row.J_child.head<3>() = by[static_cast<size_t>(row.child)].head<3>().cross(n);
+  return row;
+}
+
 // Axes that are almost, but not quite, parallel: a typing slip that freezes a planar loop.
 
 struct TiltedAxis {

@@ -4,6 +4,8 @@
 // world axes. Each scalar c comes with its exact derivatives, ċ = J V and c̈ = J A + b.
 #pragma once
 
+#include <vector>
+
 #include "base/types.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -45,7 +47,28 @@ struct PairScalar {
 ///   φ̇ = T(φ) w, w = R_WFᵀ (ω_C − ω_P), T = 1 − ½ [φ]× + c(θ) [φ]×²,
 ///   c = 1/θ² − cot(θ/2)/(2θ), θ = |φ|                     [Murray, Li, Sastry 1994, ch. 2]
 [[nodiscard]] PairScalar RotationVector(const FramePair& pair, int component);
-/// Coordinate of a joint kind.
-[[nodiscard]] PairScalar JointCoordinate(const Joint& joint, int coordinate, const FramePair& pair);
+
+// First variations of all this where the bodies are moved by small twists [θ; x of the origin] in
+// world axes and keep their velocities. Along them
+//   δ(J V) = δJ V,  δ(J A + b) = δJ A + δb                                                    (1)
+// and by other velocities, since b(V) = δJ|_V V: δb = δJ|_V δV + δJ|_δV V.                    (2)
+
+struct VariedPair {
+  FramePair at;
+  Vec3 t_P, t_C;  ///< θ of parent and child
+  Vec3 r_F, r_M, d, d_rate, centripetal;
+};
+[[nodiscard]] VariedPair MakePair(const BodyStates& states, const std::vector<Vec6>& by, int parent,
+                                  const Pose& X_PF, int child, const Pose& X_CM);
+
+struct VariedScalar {
+  PairScalar at, by;
+};
+[[nodiscard]] VariedScalar Along(const VariedPair& pair, const Vec3& n_F);
+[[nodiscard]] VariedScalar Cosine(const VariedPair& pair, const Vec3& f_F, const Vec3& m_M);
+[[nodiscard]] VariedScalar Distance(const VariedPair& pair);
+[[nodiscard]] VariedScalar Angle(const VariedScalar& s, const VariedScalar& c);
+[[nodiscard]] VariedScalar RollPitchYaw(const VariedPair& pair, int component);
+[[nodiscard]] VariedScalar RotationVector(const VariedPair& pair, int component);
 
 }  // namespace mbv::internal

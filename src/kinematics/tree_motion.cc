@@ -108,18 +108,6 @@ std::vector<double>* AnglesOf(const Mechanism& mechanism, BodyStates* states) {
   return &states->turns;
 }
 
-std::vector<double> InputsOf(const Mechanism& mechanism, const BodyStates& states,
-                             const StateFunction& function) {
-  std::vector<double> inputs;
-  for (const StateFunction::Input& input : function.inputs) {
-    const size_t at = TurnIndex(mechanism, input.coordinate);
-    const double near = at < states.turns.size() ? states.turns[at] : input.near;
-    const ScalarRow row = CoordinateRow(mechanism, input.coordinate, states, near);
-    inputs.push_back(input.rate ? RateOf(row, states.V_WB) : row.value);
-  }
-  return inputs;
-}
-
 }  // namespace
 
 void FollowAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>& angles,
@@ -159,6 +147,18 @@ double FollowedNear(const Mechanism& mechanism, const BodyStates& states,
                     const FollowedAngle& angle) {
   const size_t at = TurnIndex(mechanism, angle.coordinate);
   return at < states.turns.size() ? states.turns[at] : angle.start;
+}
+
+std::vector<double> InputsOf(const Mechanism& mechanism, const BodyStates& states,
+                             const StateFunction& function) {
+  std::vector<double> inputs;
+  for (const StateFunction::Input& input : function.inputs) {
+    const size_t at = TurnIndex(mechanism, input.coordinate);
+    const double near = at < states.turns.size() ? states.turns[at] : input.near;
+    const ScalarRow row = CoordinateRow(mechanism, input.coordinate, states, near);
+    inputs.push_back(input.rate ? RateOf(row, states.V_WB) : row.value);
+  }
+  return inputs;
 }
 
 LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,

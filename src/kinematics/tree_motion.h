@@ -56,6 +56,9 @@ void PredictAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>&
 [[nodiscard]] double FollowedNear(const Mechanism& mechanism, const BodyStates& states,
                                   const FollowedAngle& angle);
 
+/// The inputs of a function of the mechanism's state, angles in the turns that states count.
+[[nodiscard]] std::vector<double> InputsOf(const Mechanism& mechanism, const BodyStates& states,
+                                           const StateFunction& function);
 /// The load at the states: its sample with what follows from coordinates and rates added. `load`
 /// and `time_s` of the sample must be set where there is such a part.
 [[nodiscard]] LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,

@@ -180,6 +180,26 @@ void ClosureSolver::EvaluateRows(Trial* trial, bool biases) {
   for (const Spin& spin : spins_) rows_.Add(IdleRow(spin, trial->states), true);
 }
 
+void ClosureSolver::VaryRows(const std::vector<Vec6>& by, RowSet* varied) const {
+  varied->Clear();
+  for (const Joint& joint : mechanism_.joints) {
+    const ConstraintRows rows = VariedRowsOf(joint, states_, by, false);
+    varied->Add(rows, rows.rows);
+  }
+  for (const CouplingRow& row : VariedCouplingRows(mechanism_, states_, by)) varied->Add(row);
+  for (const Command& command : commands_) {
+    CouplingRow sum;
+    for (const Command::Term& term : command.terms) {
+      ScalarRow& piece =
+          sum.pieces.emplace_back(VariedRow(mechanism_, term.coordinate, states_, by));
+      piece.J_parent *= term.factor, piece.J_child *= term.factor;
+      piece.bias *= term.factor;
+    }
+    varied->Add(sum);
+  }
+  for (const Spin& spin : spins_) varied->Add(VariedIdleRow(spin, states_, by), true);
+}
+
 double ClosureSolver::Openness(const VecX& target, const std::vector<Pose>& X_WB) {
   missing_.resize(system_.size());
   const double closed_m = std::max(options_.closure_tolerance_m * length_, Rounding(X_WB));

@@ -81,6 +81,8 @@ class ClosureSolver {
   [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
   /// Twists of the moving bodies, stacked, per unit rate of each of the first `count` commands.
   [[nodiscard]] RunSummary UnitMotions(int count, MatX* motions);
+  /// First variations of rows() at states(), biases included, along twists of all bodies.
+  void VaryRows(const std::vector<Vec6>& by, RowSet* varied) const;
   /// Largest translation and rotation residual over all joints.
   [[nodiscard]] double gap_position_m() const { return gap_position_m_; }
   [[nodiscard]] double gap_rotation_rad() const { return gap_rotation_rad_; }

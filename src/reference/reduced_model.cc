@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <limits>
 #include <optional>
 
 #include "base/demand.h"
 #include "kinematics/constraints.h"
 #include "reference/closure_solver.h"
+#include "reference/derivatives.h"
 #include "reference/element_forces.h"
 #include "reference/force_solver.h"
 #include "reference/sample_recorder.h"
@@ -67,6 +69,7 @@ struct ReducedModel::Impl {
   CommandSample command;
   ReferenceSample sample;
   bool driven_known = true;  ///< in `sample`: not all callers ask
+  std::optional<internal::ForceVariations> variations;
 };
 
 ReducedModel::ReducedModel(const Mechanism& mechanism, const std::vector<Coordinate>& coordinates)
@@ -168,12 +171,8 @@ VecX ReducedModel::Forces(const MatX& T, const std::vector<LoadSample>& loads) {
   return T.transpose() * internal::Stack(required);
 }
 
-RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSample>& loads,
-                                       const VecX& drive_forces, VecX* a) {
+RunSummary ReducedModel::CheckFriction(const std::vector<int>& signs) const {
   const Mechanism& mechanism = impl_->mechanism;
-  RunSummary summary;
-  std::vector<int> signs;
-  internal::FrictionDirections(mechanism, states(), impl_->motion.duration_s, &signs);
   const ForceElement* undetermined = friction_by_load();
   const char* why = "has friction that grows with its load";
   for (size_t e = 0; e < mechanism.elements.size() && undetermined == nullptr; ++e) {
@@ -181,13 +180,19 @@ RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSamp
     undetermined = &mechanism.elements[e];
     why = "rests with dry friction";
   }
-  if (undetermined != nullptr) {
-    summary.stop = Stop::kUnsupported;
-    summary.where = mechanism.joints[static_cast<size_t>(undetermined->joint)].name;
-    summary.message = fmt::format("{} {}: a state alone does not determine accelerations",
-                                  Described(mechanism, *undetermined), why);
-    return summary;
-  }
+  if (undetermined == nullptr) return RunSummary::Done();
+  return {.stop = Stop::kUnsupported,
+          .message = fmt::format("{} {}: a state alone does not determine accelerations",
+                                 Described(mechanism, *undetermined), why),
+          .where = mechanism.joints[static_cast<size_t>(undetermined->joint)].name};
+}
+
+RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSample>& loads,
+                                       const VecX& drive_forces, VecX* a) {
+  std::vector<int> signs;
+  internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s, &signs);
+  RunSummary summary = CheckFriction(signs);
+  if (!summary.ok()) return summary;
   // Coordinates in units of their own: lengths, angles, large and small masses.
   const MatX M = MassMatrix(T);
   const VecX scale =
@@ -201,6 +206,56 @@ RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSamp
   const VecX rest = DriveRates(T).transpose() * drive_forces - Forces(T, loads);
   *a = scale.cwiseProduct(mass.solve(scale.cwiseProduct(rest)));
   return RunSummary::Done();
+}
+
+RunSummary ReducedModel::Derivatives(const MatX& T, const std::vector<LoadSample>& loads,
+                                     ForceDerivatives* out) {
+  std::vector<int> signs;
+  internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s, &signs);
+  if (RunSummary summary = CheckFriction(signs); !summary.ok()) return summary;
+  if (!impl_->variations) impl_->variations.emplace(impl_->mechanism);
+  return impl_->variations->Differentiate(&*impl_->closure, T, loads, signs, out);
+}
+
+namespace {
+
+// ∂(J_dᵀ τ)/∂q, a column per coordinate.
+MatX VariedRates(const ForceDerivatives& of, const VecX& drive_forces) {
+  const Eigen::Index n = of.by_position.cols();
+  MatX varied(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    varied.col(k) = of.drive_rate_slopes[static_cast<size_t>(k)].transpose() * drive_forces;
+  }
+  return varied;
+}
+
+}  // namespace
+
+bool MakeMotionDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
+                           MotionDerivatives* out) {
+  const MatX M = 0.5 * (of.by_acceleration + of.by_acceleration.transpose());
+  const VecX scale =
+      M.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<MatX> mass(scale.asDiagonal() * M * scale.asDiagonal());
+  if (mass.info() != Eigen::Success || !(mass.rcond() > kLeastMass)) return false;
+  const auto divided = [&](const MatX& by) {
+    return MatX(scale.asDiagonal() * mass.solve(scale.asDiagonal() * by));
+  };
+  out->by_position = divided(VariedRates(of, drive_forces) - of.by_position);
+  out->by_velocity = divided(-of.by_velocity);
+  out->by_force = divided(of.drive_rates.transpose());
+  return true;
+}
+
+bool MakeDriveForceDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
+                               DriveForceDerivatives* out) {
+  if (of.drive_rates.rows() != of.drive_rates.cols()) return false;
+  const Eigen::PartialPivLU<MatX> rates(of.drive_rates.transpose());
+  if (of.drive_rates.size() > 0 && !(rates.rcond() > kLeastMass)) return false;
+  out->by_position = rates.solve(of.by_position - VariedRates(of, drive_forces));
+  out->by_velocity = rates.solve(of.by_velocity);
+  out->by_acceleration = rates.solve(of.by_acceleration);
+  return true;
 }
 
 MatX ReducedModel::DriveRates(const MatX& T) const {

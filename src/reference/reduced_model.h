@@ -25,6 +25,35 @@
 
 namespace mbv {
 
+/// Of f(q, v, a) = M a + h, the force along each coordinate: ∂f/∂q, ∂f/∂v and ∂f/∂a = M, each
+/// n × n with a column per coordinate [N or N m per m or rad, and per s].
+struct ForceDerivatives {
+  MatX by_position, by_velocity, by_acceleration;
+  MatX drive_rates;                     ///< J_d: drives × n
+  std::vector<MatX> drive_rate_slopes;  ///< ∂J_d/∂q_k
+  /// What ∂f/∂q and ∂f/∂v are sums of (reference/derivatives.h).
+  struct Term {
+    const char* name;
+    MatX by_position, by_velocity;
+  };
+  std::vector<Term> terms;
+};
+
+/// Of a(q, v, τ) under drive forces τ: ∂a/∂q, ∂a/∂v (n × n) and ∂a/∂τ = M⁻¹ J_dᵀ (n × drives).
+struct MotionDerivatives {
+  MatX by_position, by_velocity, by_force;
+};
+/// By (3): M ∂a = ∂(J_dᵀ τ) − ∂f. False where M is singular.
+[[nodiscard]] bool MakeMotionDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
+                                         MotionDerivatives* out);
+/// Of τ(q, v, a) where drives are as many as coordinates: J_dᵀ ∂τ = ∂f − ∂(J_dᵀ) τ, drives × n
+/// each. False where they do not determine the motion.
+struct DriveForceDerivatives {
+  MatX by_position, by_velocity, by_acceleration;
+};
+[[nodiscard]] bool MakeDriveForceDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
+                                             DriveForceDerivatives* out);
+
 class ReducedModel {
  public:
   /// `coordinates`: independent of each other at home (ChooseCoordinates()), n of them. The
@@ -74,6 +103,10 @@ class ReducedModel {
   /// choice (free_motion.h integrates those).
   [[nodiscard]] RunSummary Accelerations(const MatX& T, const std::vector<LoadSample>& loads,
                                          const VecX& drive_forces, VecX* a);
+  /// Derivatives of M a + h at the state that Move() reached. kUnsupported with dry friction at
+  /// rest or by load, where there are none.
+  [[nodiscard]] RunSummary Derivatives(const MatX& T, const std::vector<LoadSample>& loads,
+                                       ForceDerivatives* out);
   /// J_d: drives × n.
   [[nodiscard]] MatX DriveRates(const MatX& T) const;
   /// Forces of drives and prescribed joints and all reactions, in sample(); as the reference, the
@@ -81,6 +114,9 @@ class ReducedModel {
   [[nodiscard]] RunSummary AllForces(const std::vector<LoadSample>& loads);
 
  private:
+  /// kUnsupported where friction makes forces no function of the state that has derivatives.
+  [[nodiscard]] RunSummary CheckFriction(const std::vector<int>& signs) const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -15,6 +15,7 @@
 #include "base/roles.h"
 #include "features/certify/exact_model.h"
 #include "features/certify/exact_numbers.h"
+#include "math/ridders.h"
 #include "mechanism/channels.h"
 #include "mechanism/reach.h"
 #include "reference/reference.h"
@@ -31,6 +32,28 @@ using exact::Six;
 using exact::Wrench;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// A dual number is what it is.
+double Below(const exact::Dual& x) { return x.x; }
+double Above(const exact::Dual& x) { return x.x; }
+double Nearest(const exact::Dual& x) { return x.x; }
+exact::Dual Middle(const exact::Dual& x) { return x; }
+exact::Dual Around(const exact::Dual& middle, double /*radius*/) { return middle; }
+exact::Dual Hull(const exact::Dual& x, const exact::Dual& /*y*/) { return x; }
+template <typename T>
+T Hull(const T& x, const T& y) {
+  return mp::hull(x, y);
+}
+template <typename T>
+constexpr bool kIsDual = std::is_same_v<T, exact::Dual>;
+// The part that depends on what was varied.
+double Slope(const exact::Dual& x) { return x.d; }
+template <typename T>
+double Slope(const T& /*x*/) {
+  return 0.0;
+}
+// Slopes follow values one correction later; each takes their errors to round-off.
+constexpr int kDualPasses = 4;
 
 // Doubles that bound what intervals hold.
 template <typename T>
@@ -126,13 +149,20 @@ class ProvedSystem {
   }
   // Takes R residual away from x.
   void Correct(const std::vector<T>& residual, std::vector<T>* x) const {
-    VecX scaled(static_cast<Eigen::Index>(residual.size()));
+    VecX scaled(static_cast<Eigen::Index>(residual.size())), slope(scaled.size());
     for (size_t i = 0; i < residual.size(); ++i) {
       scaled[static_cast<Eigen::Index>(i)] = Nearest(residual[i]) * row_scale_[i];
+      slope[static_cast<Eigen::Index>(i)] = Slope(residual[i]) * row_scale_[i];
     }
     const VecX step = inverse_ * scaled;
     for (size_t i = 0; i < x->size(); ++i) {
       (*x)[i] = Middle(T((*x)[i] - T(step[static_cast<Eigen::Index>(i)] * column_scale_[i])));
+    }
+    if constexpr (kIsDual<T>) {
+      const VecX slopes = inverse_ * slope;
+      for (size_t i = 0; i < x->size(); ++i) {
+        (*x)[i].d -= slopes[static_cast<Eigen::Index>(i)] * column_scale_[i];
+      }
     }
   }
   [[nodiscard]] T Widened(const T& x, size_t i, double scaled_error) const {
@@ -152,7 +182,9 @@ class ProvedSystem {
       }
       reached = Reached(residual);
       const double now = reached.size() == 0 ? 0.0 : reached.maxCoeff();
-      if (!(now < 0.5 * last) || now == 0.0 || k == 12) break;
+      const bool done =
+          kIsDual<T> ? k == kDualPasses : !(now < 0.5 * last) || now == 0.0 || k == 12;
+      if (done) break;
       last = now;
       Correct(residual, &x);
     }
@@ -236,6 +268,9 @@ struct Start {
   std::vector<Pose> X_WB;
   std::vector<double> coupled, turns;
   CommandSample command;
+  /// What is varied, of dual numbers.
+  int varied = -1;  ///< a command
+  enum class Of { kPosition, kVelocity, kAcceleration } of = Of::kPosition;
 };
 
 template <typename T>
@@ -261,16 +296,33 @@ constexpr const char* kForcesSingular =
 template <typename T>
 class Prover {
  public:
-  Prover(const Mechanism& mechanism, const Motion& motion, double contradiction)
+  /// `along_commands`: forces that act along the commands instead of those of drives.
+  Prover(const Mechanism& mechanism, const Motion& motion, double contradiction,
+         bool along_commands = false)
       : model_(mechanism),
         motion_(motion),
         contradiction_(contradiction),
+        along_commands_(along_commands),
         length_(PowerOfTwo(CharacteristicLength(mechanism))) {}
 
   /// Whether reactions of what was proved are left open by statics.
   [[nodiscard]] bool reactions_open() const { return !columns_.empty() && !reactions_unique_; }
   /// Whether drives share their forces.
   [[nodiscard]] bool shared() const { return shared_; }
+
+  /// Of dual numbers, with commands as coordinates: the force along each, or why there is none.
+  std::string Evaluate(const Start& start, std::vector<T>* forces) {
+    SampleProof proof;
+    model_.StartFrom(start.X_WB, &q_);
+    MakeEquations(start);
+    std::string trouble = Prove(start, &proof);
+    if (!trouble.empty()) return trouble;
+    std::vector<T> all(forces_.size(), T(0));
+    for (size_t k = 0; k < columns_.size(); ++k) all[columns_[k]] = force_[k];
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(transmitting_);
+    forces->assign(first, first + static_cast<std::ptrdiff_t>(motion_.commands.size()));
+    return "";
+  }
 
   SampleProof Prove(const Start& start) {
     SampleProof proof;
@@ -333,6 +385,14 @@ class Prover {
       asked.value = T(start.command.position[at]);
       asked.rate = T(start.command.velocity[at]);
       asked.acceleration = T(start.command.acceleration[at]);
+      if constexpr (kIsDual<T>) {
+        if (start.varied == static_cast<int>(k)) {
+          (start.of == Start::Of::kPosition   ? asked.value
+           : start.of == Start::Of::kVelocity ? asked.rate
+                                              : asked.acceleration)
+              .d = 1.0;
+        }
+      }
       for (const Command::Term& term : command.terms) {
         const Coordinate& c = term.coordinate;
         const auto i = static_cast<size_t>(c.index);
@@ -401,7 +461,7 @@ class Prover {
       for (size_t j = 0; j < static_cast<size_t>(model_.coordinates()); ++j) {
         if (!Moves(motions[j], exerted)) continue;
         T slope = model_.Along(motions[j], exerted);
-        if (!turn.empty()) slope = mp::hull(slope, model_.Along(motions[j], turn));
+        if (!turn.empty()) slope = Hull(slope, model_.Along(motions[j], turn));
         J[i].push_back({static_cast<int>(j), std::move(slope)});
       }
     }
@@ -506,7 +566,9 @@ class Prover {
   }
 
   // Newton's method to the last digits but a few; |R residual| then.
-  static constexpr double kEnough = std::is_same_v<T, exact::Fine> ? 1e-31 : 1e-69;
+  static constexpr double kEnough = kIsDual<T>                       ? 0.0
+                                    : std::is_same_v<T, exact::Fine> ? 1e-31
+                                                                     : 1e-69;
   bool Refine(VecX* reached) {
     double last = kInfinity;
     for (int k = 0;; ++k) {
@@ -514,10 +576,12 @@ class Prover {
       *reached = system_->Reached(residual);
       const double now = reached->size() == 0 ? 0.0 : reached->maxCoeff();
       if (!std::isfinite(now)) return false;
-      if (now < kEnough || !(now < 0.5 * last) || k == 20) return true;
+      if (now < kEnough || !(now < 0.5 * last) || k == 20) break;
       last = now;
       system_->Correct(residual, &q_);
     }
+    for (int k = 0; kIsDual<T> && k < kDualPasses; ++k) system_->Correct(Residuals(q_), &q_);
+    return true;
   }
   // The largest scaled way from there.
   [[nodiscard]] double Moved(const std::vector<T>& start) const {
@@ -755,7 +819,11 @@ class Prover {
       if (transmitting[k]) forces_.push_back({wrenches_[k], asked_[k].equation.length()});
     }
     transmitting_ = forces_.size();
-    for (const Equation<T>& equation : driven_) add(equation);
+    if (along_commands_) {
+      for (size_t k = 0; k < motion_.commands.size(); ++k) add(asked_[closures_ + k].equation);
+    } else {
+      for (const Equation<T>& equation : driven_) add(equation);
+    }
     for (size_t s = 0; s < model_.spins().size(); ++s) {
       add(Model<T>::SpinEquation(static_cast<int>(s)));
     }
@@ -800,9 +868,9 @@ class Prover {
   }
 
   // An expression is a function of doubles: what it gives at the doubles nearest to its inputs
-  // counts as exact.
-  [[nodiscard]] double Followed(const StateFunction& function, const Start& start) const {
-    std::vector<double> inputs;
+  // counts as exact, and its slopes are extrapolated differences.
+  [[nodiscard]] T Followed(const StateFunction& function, const Start& start) const {
+    std::vector<double> inputs, slopes;
     for (const StateFunction::Input& input : function.inputs) {
       const auto i = static_cast<size_t>(input.coordinate.index);
       const size_t drives = mechanism().drives.size();
@@ -813,8 +881,24 @@ class Prover {
       const Series<T> x =
           model_.ValueAt(model_.CoordinateEquation(input.coordinate, near), motions_);
       inputs.push_back(Nearest(input.rate ? x.r : x.v));
+      slopes.push_back(Slope(input.rate ? x.r : x.v));
     }
-    return function.value(start.time_s, inputs);
+    T value(function.value(start.time_s, inputs));
+    for (size_t k = 0; k < inputs.size(); ++k) {
+      if constexpr (kIsDual<T>) {
+        if (slopes[k] == 0.0) continue;
+        const double at = inputs[k];
+        const bool length = IsLength(mechanism(), function.inputs[k].coordinate);
+        value.d += slopes[k] * SlopeAt(
+                                   [&](double x) {
+                                     inputs[k] = x;
+                                     return function.value(start.time_s, inputs);
+                                   },
+                                   at, 0.1 * (length ? length_ : 1.0));
+        inputs[k] = at;
+      }
+    }
+    return value;
   }
 
   // Loads, springs and elements; gravity's compensation that drives exert.
@@ -826,7 +910,7 @@ class Prover {
         for (const Load::Following& part : load.load->following) {
           const auto c = static_cast<size_t>(part.component);
           T& component = c < 3 ? f[c] : m[c - 3];
-          component += T(Followed(part.function, start));
+          component += Followed(part.function, start);
         }
       }
       if (load.in_body_axes) f = bodies_[b].R * f, m = bodies_[b].R * m;
@@ -974,6 +1058,7 @@ class Prover {
   Model<T> model_;
   const Motion& motion_;
   const double contradiction_;
+  const bool along_commands_;
   const double length_;
   std::vector<T> q_;
   std::vector<Asked> asked_;  ///< closures, commands, idle spins
@@ -1265,6 +1350,35 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
   certificate.left_out.emplace_back(
       "which of several assembly modes is meant: the one of the reference's pose is proved");
   return certificate;
+}
+
+std::string DifferentiateExactly(const Mechanism& mechanism, const Motion& motion,
+                                 const BodyStates& near, const CommandSample& command,
+                                 ExactDerivatives* out) {
+  Prover<exact::Dual> prover(mechanism, motion, CertifyOptions().contradiction, true);
+  Start start;
+  start.time_s = command.time_s;
+  start.X_WB = near.X_WB, start.coupled = near.coupled, start.turns = near.turns;
+  start.command = command;
+  const auto n = static_cast<Eigen::Index>(motion.commands.size());
+  std::vector<exact::Dual> forces;
+  out->force.resize(n);
+  for (const auto& [of, matrix] : {std::pair(Start::Of::kPosition, &out->by_position),
+                                   std::pair(Start::Of::kVelocity, &out->by_velocity),
+                                   std::pair(Start::Of::kAcceleration, &out->by_acceleration)}) {
+    matrix->resize(n, n);
+    start.of = of;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      start.varied = static_cast<int>(k);
+      if (std::string trouble = prover.Evaluate(start, &forces); !trouble.empty()) return trouble;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const exact::Dual& force = forces[static_cast<size_t>(i)];
+        out->force[i] = force.x;
+        (*matrix)(i, k) = force.d;
+      }
+    }
+  }
+  return "";
 }
 
 }  // namespace mbv

@@ -110,4 +110,17 @@ struct CertifiedTrace {
                                   const std::vector<CertifiedTrace>& traces,
                                   const CertifyOptions& options = {});
 
+/// Of the forces along the commands, as coordinates q, that hold a state q, v, a (`command`):
+/// values, ∂f/∂q, ∂f/∂v and ∂f/∂a, columns per coordinate.
+struct ExactDerivatives {
+  VecX force;
+  MatX by_position, by_velocity, by_acceleration;
+};
+/// By the same evaluator in dual numbers: as far as doubles go, nothing is enclosed. Near the poses
+/// `near`. Why there are none, or "". Slopes of loads that are expressions are extrapolated
+/// differences.
+[[nodiscard]] std::string DifferentiateExactly(const Mechanism& mechanism, const Motion& motion,
+                                               const BodyStates& near, const CommandSample& command,
+                                               ExactDerivatives* out);
+
 }  // namespace mbv

@@ -657,6 +657,12 @@ template Fine Model<Fine>::ValueAt(const Equation<Fine>&, const std::vector<Fram
 template Series<Fine> Model<Fine>::ValueAt(const Equation<Fine>&,
                                            const std::vector<Frame<Series<Fine>>>&,
                                            Last<Series<Fine>>*) const;
+template class Model<Dual>;
+template Dual Model<Dual>::ValueAt(const Equation<Dual>&, const std::vector<Frame<Dual>>&,
+                                   Last<Dual>*) const;
+template Series<Dual> Model<Dual>::ValueAt(const Equation<Dual>&,
+                                           const std::vector<Frame<Series<Dual>>>&,
+                                           Last<Series<Dual>>*) const;
 template class Model<Finest>;
 template Finest Model<Finest>::ValueAt(const Equation<Finest>&, const std::vector<Frame<Finest>>&,
                                        Last<Finest>*) const;

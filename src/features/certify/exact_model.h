@@ -180,14 +180,14 @@ S Angle(const S& s, const S& c, const NearAngle<T>& near) {
   return turn + S(near.angle);
 }
 
-/// θ/sin θ as a function of z = sin²θ, |θ| < π/2: a series near 0, whose rest from the N-th term on
-/// is below N² z^(N−2) with two derivatives.
+/// θ/sin θ, |θ| < π: near 0 a series in z = sin²θ, whose rest from the N-th term on is below
+/// N² z^(N−2) with two derivatives, else a function of c = cos θ.
 template <typename S>
-S AngleOverSine(const S& z) {
-  using std::asin, std::pow, std::sqrt;
+S AngleOverSine(const S& z, const S& c) {
+  using std::acos, std::sqrt;
   using T = std::decay_t<decltype(ValueOf(z))>;
   const T& x = ValueOf(z);
-  if (AtMost(x, 1.0 / 16.0)) {
+  if (AtMost(x, 1.0 / 16.0) && AtMost(T(-ValueOf(c)), 0.0)) {
     constexpr int kTerms = 80;
     T f(0), f1(0), f2(0), a(1), power(1), power1(0), power2(0);  // a zⁿ: a = (2n)!/(4ⁿ n!² (2n+1))
     T binomial(1);
@@ -202,11 +202,10 @@ S AngleOverSine(const S& z) {
     const T rest = Symmetric<T>(1e4 * std::pow(1.0 / 16.0, kTerms - 2));
     return Chain(z, T(f + rest), T(f1 + rest), T(f2 + rest));
   }
-  const T root = sqrt(x), cosine = sqrt(T(1 - x));
-  const T f = asin(root) / root;
-  const T f1 = (1 / cosine - f) / (2 * x);
-  const T f2 = (1 / (2 * cosine * cosine * cosine) - 3 * f1) / (2 * x);
-  return Chain(z, f, f1, f2);
+  const T &y = ValueOf(c), square = 1 - y * y;
+  const T f = acos(y) / sqrt(square);
+  const T f1 = (y * f - 1) / square;
+  return Chain(c, f, f1, T((f + 3 * y * f1) / square));
 }
 
 // Vectors and matrices.
@@ -408,7 +407,7 @@ struct Scalar {
     kRoll,
     kPitch,
     kYaw,
-    kRotationVector,  ///< f·log R, |log R| < π/2
+    kRotationVector,  ///< f·log R, |log R| < π
   };
   Kind kind = Kind::kSlide;
   size_t frames = 0;   ///< index of the pair
@@ -436,7 +435,9 @@ struct Scalar {
         return Angle(R(1, 0), R(0, 0), near);
       case Kind::kRotationVector: {
         const Vector<S> sine = Times(T(T(1) / 2), Vee(R) - Vee(Transposed(R)));
-        return AngleOverSine(Dot(sine, sine)) * Dot(f, sine);
+        const T half(T(1) / 2);
+        const S cosine = half * (R(0, 0) + R(1, 1) + R(2, 2)) - S(half);
+        return AngleOverSine(Dot(sine, sine), cosine) * Dot(f, sine);
       }
     }
     return S(T(0));

@@ -26,32 +26,7 @@ Mechanism Shipped(const std::string& name) {
 
 // A tree whose joints are of every kind, with the same kinds once more as loops: locks and
 // coordinates of each.
-const char kAllKinds[] = R"(name: all_kinds
-gravity: [0, 0, -9.81]
-world:
-  frames: {w: {position: [0.1, -0.2, 0.3], rotation: {rpy_deg: [10, 20, 30]}}}
-bodies:
-  a: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0.2, 0.1, 0], rotation: {rpy_deg: [5, -40, 15]}}}}
-  b: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0.3, 0, 0.1], rotation: {rpy_deg: [-25, 10, 70]}}}}
-  c: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0, 0.3, 0.1], rotation: {rpy_deg: [35, 0, -20]}}}}
-  d: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0.1, 0.1, 0.4]}}}
-  e: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [-0.2, 0.1, 0]}}}
-  f: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0.1, -0.1, 0.1]}}}
-  g: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0.1, -0.3, 0.1]}}}
-  h: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0.1, 0, 0]}}}
-  i: {mass: 1, inertia: [1, 1, 1], frames: {m: {position: [0, 0, 0.2]}}}
-joints:
-  J1: {kind: revolute, parent: world.w, child: a, axis: [1, 2, 3]}
-  J2: {kind: prismatic, parent: a.m, child: b, axis: [1, 0, 1]}
-  J3: {kind: cylindrical, parent: b.m, child: c, axis: y}
-  J4: {kind: universal, parent: c.m, child: d, axis: x, axis2: y}
-  J5: {kind: spherical, parent: d.m, child: e}
-  J6: {kind: planar, parent: e.m, child: f, axis: [1, 1, 0]}
-  J7: {kind: point_on_line, parent: f.m, child: g, axis: x}
-  J8: {kind: point_on_plane, parent: g.m, child: h, axis: [0, 1, 1]}
-  J9: {kind: free, parent: h.m, child: i}
-outputs: {tool: i.m}
-)";
+const char kAllKinds[] = "/tests/mechanisms/all_joint_kinds.yaml";
 
 // All coordinates and all locks that a joint of any kind can have, between the ends of the tree.
 std::vector<Equation<T>> EveryEquation(Model<T>* model) {
@@ -110,7 +85,7 @@ TEST(ExactModel, SlopesAreTheRatesOfTheSameEquations) {
 }
 
 TEST(ExactModel, SlopesOfAllJointKinds) {
-  LoadResult loaded = LoadModelText(kAllKinds, "all.yaml");
+  LoadResult loaded = LoadModel(SourcePath(kAllKinds));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   Model<T> tree(*loaded.mechanism);
   CompareSlopes(&tree, loaded.mechanism->X_WB_home, "tree");
@@ -137,7 +112,7 @@ TEST(ExactModel, SlopesOfAllJointKinds) {
 // Accelerations in series against those of positions half a step before and behind, in exact
 // differences: the rest is of the order of h².
 TEST(ExactModel, SeriesAreDerivativesOfPositions) {
-  LoadResult loaded = LoadModelText(kAllKinds, "all.yaml");
+  LoadResult loaded = LoadModel(SourcePath(kAllKinds));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   Model<T> model(*loaded.mechanism);
   std::vector<T> q;
