@@ -16,7 +16,8 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddAuditCommand, AddListCommand, AddWorkspaceCommand, AddStiffnessCommand, AddConvergeCommand,
     AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
     AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
-    AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand, AddCodeCommand;
+    AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand, AddCodeCommand,
+    AddLineariseCommand;
 
 namespace {
 
@@ -42,6 +43,7 @@ constexpr std::array kCommands = {
     CommandRow{AddAuditCommand, kUnderstand},
     CommandRow{AddStiffnessCommand, kUnderstand},
     CommandRow{AddWorkspaceCommand, kUnderstand},
+    CommandRow{AddLineariseCommand, kUnderstand},
     CommandRow{AddSurveyCommand, kRobots, true},
     CommandRow{AddInertiaCommand, kRobots, true},
     CommandRow{AddSizeCommand, kRobots},

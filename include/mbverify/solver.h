@@ -196,6 +196,15 @@ class Solver {
   /// The part of the bias at rest: weight and springs.
   Status Gravity(const Eigen::VectorXd& q, Eigen::VectorXd* gravity);
 
+  /// ∂f/∂q, ∂f/∂v and ∂f/∂a of f = M a + bias, the force along each coordinate (n × n, columns per
+  /// coordinate), without external forces. kUnsupported with dry friction that rests, or grows with
+  /// its load.
+  struct ForceSlopes {
+    Eigen::MatrixXd by_position, by_velocity, by_acceleration;
+  };
+  Status ForceDerivatives(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                          const Eigen::VectorXd& a, ForceSlopes* slopes);
+
   /// The map to all bodies: V = T v and A = T a + Σ_ij H_ij v_i v_j. T: 6·(bodies − 1) × n, the
   /// world left out; H: as many rows, n·n columns, H_ij in column i n + j.
   Status Derivatives(const Eigen::VectorXd& q, Eigen::MatrixXd* T, Eigen::MatrixXd* H);

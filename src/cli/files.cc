@@ -159,18 +159,21 @@ int WriteWholeFile(const std::string& path, const std::string& content,
 
 namespace {
 
+// NAME=LOW:HIGH, or `single` NAME=VALUE, which is both.
 std::optional<NamedRange> ReadNamedRange(
-    const std::string& text, const std::vector<std::string>& names,
+    const std::string& option, bool single, const std::string& text,
+    const std::vector<std::string>& names,
     const std::function<std::string(const std::string&)>& unit_of) {
   const auto refuse = [](const std::string& message, const std::string& hint) {
     (void)Refuse(message, hint);
     return std::nullopt;
   };
-  const char* instance = "for instance pitch_deg=-50:30";
+  const char* instance = single ? "for instance pitch_deg=-20" : "for instance pitch_deg=-50:30";
   const auto assigned = SplitSet(text);
   const size_t colon = assigned ? assigned->second.find(':') : std::string::npos;
-  if (colon == std::string::npos) {
-    return refuse("--range " + text + " is not NAME=LOW:HIGH", instance);
+  if (!assigned || (!single && colon == std::string::npos)) {
+    return refuse(option + " " + text + " is not NAME=" + (single ? "VALUE" : "LOW:HIGH"),
+                  instance);
   }
   const NameInUnit named =
       SplitUnit(assigned->first, [&](const std::string& name) { return Contains(names, name); });
@@ -179,15 +182,21 @@ std::optional<NamedRange> ReadNamedRange(
     const double value = std::strtod(word.c_str(), &end);
     return word.empty() || *end != '\0' || !std::isfinite(value) ? kNan : named.unit.to_si(value);
   };
-  NamedRange range{.name = named.name,
-                   .low = number(assigned->second.substr(0, colon)),
-                   .high = number(assigned->second.substr(colon + 1))};
+  NamedRange range{.name = named.name, .low = kNan, .high = kNan};
+  if (single) {
+    range.low = range.high = number(assigned->second);
+  } else {
+    range.low = number(assigned->second.substr(0, colon));
+    range.high = number(assigned->second.substr(colon + 1));
+  }
   if (std::isnan(range.low) || std::isnan(range.high)) {
-    return refuse("--range " + text + ": two numbers are needed", instance);
+    return refuse(
+        option + " " + text + (single ? ": a number is" : ": two numbers are") + " needed",
+        instance);
   }
   const std::string unit = Contains(names, range.name) ? unit_of(range.name) : "";
   if (!unit.empty() && !named.unit.Suits(unit)) {
-    return refuse("--range " + text + ": the coordinate is in " + unit,
+    return refuse(option + " " + text + ": the coordinate is in " + unit,
                   unit == "rad" ? "NAME=… in rad or NAME_deg=…" : "NAME=… in m or NAME_mm=…");
   }
   return range;
@@ -195,20 +204,49 @@ std::optional<NamedRange> ReadNamedRange(
 
 }  // namespace
 
-std::optional<std::vector<NamedRange>> ReadNamedRanges(
-    const std::vector<std::string>& texts, const std::vector<std::string>& names,
+namespace {
+
+std::optional<std::vector<NamedRange>> ReadNamed(
+    const std::string& option, bool single, const std::vector<std::string>& texts,
+    const std::vector<std::string>& names,
     const std::function<std::string(const std::string&)>& unit_of) {
   std::vector<NamedRange> ranges;
   for (const std::string& text : texts) {
-    const std::optional<NamedRange> range = ReadNamedRange(text, names, unit_of);
+    const auto range = ReadNamedRange(option, single, text, names, unit_of);
     if (!range) return std::nullopt;
     if (std::ranges::find(ranges, range->name, &NamedRange::name) != ranges.end()) {
-      (void)Refuse("--range of '" + range->name + "' is stated twice", "each coordinate once");
+      (void)Refuse(option + " of '" + range->name + "' is stated twice", "each coordinate once");
       return std::nullopt;
     }
     ranges.push_back(*range);
   }
   return ranges;
+}
+
+}  // namespace
+
+std::optional<std::vector<NamedRange>> ReadNamedRanges(
+    const std::vector<std::string>& texts, const std::vector<std::string>& names,
+    const std::function<std::string(const std::string&)>& unit_of) {
+  return ReadNamed("--range", false, texts, names, unit_of);
+}
+
+std::optional<std::map<std::string, double>> ReadNamedValues(
+    const std::string& option, const std::vector<std::string>& texts,
+    const std::vector<std::string>& names,
+    const std::function<std::string(const std::string&)>& unit_of) {
+  const auto ranges = ReadNamed(option, true, texts, names, unit_of);
+  if (!ranges) return std::nullopt;
+  std::map<std::string, double> values;
+  for (const NamedRange& range : *ranges) {
+    if (!Contains(names, range.name)) {
+      (void)Refuse(option + ": there is no '" + range.name + "'",
+                   DidYouMean(range.name, names, "there are: " + Joined(names, 8)));
+      return std::nullopt;
+    }
+    values[range.name] = range.low;
+  }
+  return values;
 }
 
 bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {

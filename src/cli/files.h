@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -65,6 +66,12 @@ struct NamedRange {
 /// "rad" ("": any); empty after a message. A name that is not known is taken as it is.
 [[nodiscard]] std::optional<std::vector<NamedRange>> ReadNamedRanges(
     const std::vector<std::string>& texts, const std::vector<std::string>& names,
+    const std::function<std::string(const std::string&)>& unit_of);
+
+/// NAME=VALUE of `option`, each name one of `names`; empty after a message.
+[[nodiscard]] std::optional<std::map<std::string, double>> ReadNamedValues(
+    const std::string& option, const std::vector<std::string>& texts,
+    const std::vector<std::string>& names,
     const std::function<std::string(const std::string&)>& unit_of);
 
 /// Writes a file whole or not at all (see WriteFile in base/files.h), but not over one of `inputs`

@@ -1,9 +1,11 @@
 #include "kinematics/command_rank.h"
 
+#include <fmt/format.h>
 #include <Eigen/Dense>
 #include <algorithm>
 #include <functional>
 
+#include "base/text.h"
 #include "kinematics/constraints.h"
 #include "kinematics/row_stack.h"
 #include "mechanism/motion.h"
@@ -132,6 +134,74 @@ MatX GradientsInDofs(const Mechanism& mechanism, const std::vector<Coordinate>& 
 }
 
 }  // namespace
+
+std::optional<NamedChoice> ChooseNamedCoordinates(const Mechanism& mechanism,
+                                                  const std::vector<std::string>& names,
+                                                  const std::vector<Coordinate>& first,
+                                                  Diagnostics* diagnostics) {
+  constexpr size_t kNamed = 8;
+  NamedChoice choice;
+  const std::vector<NamedCoordinate> all = NamedMotionCoordinates(mechanism);
+  const auto error = [&](const std::string& message, const std::string& hint) {
+    diagnostics->AddError(mechanism.file, message, hint);
+    return std::nullopt;
+  };
+  std::vector<NamedCoordinate> candidates;
+  const auto is_candidate = [&](const std::string& name) {
+    return std::ranges::find(candidates, name, &NamedCoordinate::name) != candidates.end();
+  };
+  for (const NamedCoordinate& at : all) {
+    const bool held = at.coordinate.kind == Coordinate::Kind::kPrescribed;
+    if (held && !Contains(names, at.name)) candidates.push_back(at);
+  }
+  choice.held = candidates;
+  for (const std::string& name : names) {
+    const auto at = std::ranges::find(all, name, &NamedCoordinate::name);
+    if (at == all.end()) {
+      const std::vector<std::string> known = NamesOf(all);
+      return error("there is no coordinate '" + name + "'",
+                   DidYouMean(name, known, "there are: " + Joined(known, kNamed)));
+    }
+    if (is_candidate(name)) return error("coordinate '" + name + "' is chosen twice", "each once");
+    candidates.push_back(*at);
+  }
+  const auto add = [&](auto wanted) {
+    for (const NamedCoordinate& at : all) {
+      if (wanted(at.coordinate) && !is_candidate(at.name)) candidates.push_back(at);
+    }
+  };
+  if (names.empty()) {
+    add([&](const Coordinate& c) { return std::ranges::find(first, c) != first.end(); });
+    add([](const Coordinate& c) { return c.kind == Coordinate::Kind::kDrive; });
+  }
+  const size_t preferred = candidates.size();
+  add([](const Coordinate& /*any*/) { return true; });
+  std::vector<Coordinate> at;
+  at.reserve(candidates.size());
+  for (const NamedCoordinate& candidate : candidates) at.push_back(candidate.coordinate);
+  const CoordinateChoice found = ChooseCoordinates(mechanism, at, preferred);
+  std::vector<std::string> chosen, depend;
+  for (const size_t k : found.chosen) {
+    if (k < choice.held.size()) continue;
+    chosen.push_back(candidates[k].name);
+    choice.coordinates.push_back(candidates[k]);
+  }
+  for (const size_t k : found.dependent) depend.push_back(candidates[k].name);
+  const bool all_chosen =
+      std::ranges::all_of(found.chosen, [&](size_t k) { return k < preferred; });
+  if (!names.empty() && (!depend.empty() || !all_chosen)) {
+    return error(depend.empty()
+                     ? fmt::format("{} has {} degrees of freedom, of which {} are held or chosen",
+                                   mechanism.name, found.dofs, preferred)
+                     : "at home these depend on those before: " + Joined(depend, kNamed),
+                 "a set that does: " + Joined(chosen, kNamed));
+  }
+  if (found.left() > 0 || choice.coordinates.empty()) {
+    return error("no set of coordinates holds the mechanism at home",
+                 "a mechanism whose motion coordinates of joints, drives or outputs determine");
+  }
+  return choice;
+}
 
 std::vector<size_t> StuckDrives(const Mechanism& mechanism) {
   std::vector<Coordinate> drives;

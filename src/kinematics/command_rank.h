@@ -1,9 +1,11 @@
 // Which commands determine the motion, which contradict each other, and what stays free.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "base/diagnostics.h"
 #include "base/types.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -45,6 +47,17 @@ struct CoordinateChoice {
 [[nodiscard]] CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                                  const std::vector<Coordinate>& candidates,
                                                  size_t preferred);
+
+/// A set of coordinates by name that holds each DOF once: the prescribed joints that are not
+/// chosen, which are held, and the others.
+struct NamedChoice {
+  std::vector<NamedCoordinate> held, coordinates;
+};
+/// `names` of NamedMotionCoordinates(); without any those `first`, then drives, then others, as far
+/// as they are independent at home. Nothing after a finding.
+[[nodiscard]] std::optional<NamedChoice> ChooseNamedCoordinates(
+    const Mechanism& mechanism, const std::vector<std::string>& names,
+    const std::vector<Coordinate>& first, Diagnostics* diagnostics);
 
 /// Drives that cannot move at home, by index.
 [[nodiscard]] std::vector<size_t> StuckDrives(const Mechanism& mechanism);

@@ -107,6 +107,7 @@ RunSummary ReducedModel::Move(const VecX& q, const VecX& v, const VecX& a) {
     return summary;
   }
   impl_->sample.states = impl_->closure->states();
+  impl_->sample.control = impl_->closure->control();
   impl_->recorder->RecordOutputs(&impl_->sample);
   impl_->driven_known = false;
   return summary;

@@ -6,6 +6,7 @@
 
 #include "base/inputs.h"
 #include "base/markup.h"
+#include "base/roles.h"
 #include "base/sha256.h"
 #include "plot/svg_plot.h"
 #include "report/load_figures.h"
@@ -255,6 +256,20 @@ constexpr const char* kHowToReadChecks =
     "The margin is the limit over the value; a full bar is ten decimal digits. Held: a drive "
     "motion compared with itself, which verifies nothing.";
 
+constexpr const char* kReplayPlace = "<div id=\"replay-view\"></div>\n";
+
+// Only our own script runs: the one in the page by its hash, a shared one by its origin.
+void AddScripts(const HtmlInput& input, PageHead* head) {
+  static const std::string hash = CspHash(PageScript());
+  const bool own = input.script_link.empty();
+  head->script_source = own ? hash : "'self'";
+  head->scripts =
+      "<script type=\"application/json\" id=\"page-data\">" + PageData(input) + "</script>\n" +
+      (own ? fmt::format("<script>{}</script>", PageScript())
+           : fmt::format("<script src=\"{}\"></script>", EncodeLink(input.script_link))) +
+      "\n";
+}
+
 class PageWriter {
  public:
   explicit PageWriter(const HtmlInput& input)
@@ -362,7 +377,8 @@ class PageWriter {
     page_.Add(
         "Replay", "Replay",
         "<noscript><p class=\"faint\">The replay needs JavaScript; the pictures below do not.</p>"
-        "</noscript>\n<div id=\"replay-view\"></div>\n");
+        "</noscript>\n" +
+            std::string(kReplayPlace));
     page_.Add("Signals over time", "Plots",
               "<noscript><p class=\"faint\">Without JavaScript the plots do not zoom.</p>\n" +
                   StaticPlotsHtml(report_) + "</noscript>\n<div id=\"plot-view\"></div>\n");
@@ -384,28 +400,13 @@ class PageWriter {
                   "this page.</p>\n");
   }
 
-  // Only our own script runs: the one in the page by its hash, a shared one by its origin.
-  [[nodiscard]] std::string ScriptSource() const {
-    static const std::string hash = CspHash(PageScript());
-    return input_.script_link.empty() ? hash : "'self'";
-  }
-
-  [[nodiscard]] std::string ScriptElement() const {
-    if (input_.script_link.empty()) {
-      return fmt::format("<script>{}</script>", PageScript());
-    }
-    return fmt::format("<script src=\"{}\"></script>", EncodeLink(input_.script_link));
-  }
-
   [[nodiscard]] PageHead Head() const {
     PageHead head = HeadOf(view_);
     head.kicker = "mbverify report";
     head.footer =
         "Written by mbverify. Forces, errors and poses are embedded; all digits are in traces.csv "
         "and summary.json.";
-    head.script_source = ScriptSource();
-    head.scripts = "<script type=\"application/json\" id=\"page-data\">" + PageData(input_) +
-                   "</script>\n" + ScriptElement() + "\n";
+    AddScripts(input_, &head);
     return head;
   }
 
@@ -427,6 +428,23 @@ class PageWriter {
 
 std::string SharedScriptName() {
   return fmt::format("report-{}.js", ContentFingerprint(std::string(PageScript())));
+}
+
+void AddReplay(const Mechanism& mechanism, const std::vector<std::vector<Pose>>& X_WB,
+               const std::vector<double>& time_s, std::map<std::string, HtmlPaint> paints,
+               const std::string& title, const std::string& remark, Page* page, PageHead* head) {
+  Report report;
+  report.mechanism = mechanism.name, report.scenario = title;
+  WitnessRecord& moving = report.witnesses.emplace_back();
+  moving.name = role::kSimulated.name;
+  moving.trace.time_s = time_s;
+  HtmlInput input;
+  input.report = &report, input.mechanism = &mechanism, input.X_WB = &X_WB;
+  input.paints = std::move(paints);
+  page->Add(title, "Motion",
+            kReplayPlace + Note(remark) +
+                "<noscript><p class=\"faint\">It needs JavaScript.</p></noscript>\n");
+  AddScripts(input, head);
 }
 
 std::string ToHtml(const HtmlInput& input) { return PageWriter(input).Write(); }

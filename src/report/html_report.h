@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "report/page.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -54,6 +55,12 @@ struct HtmlInput {
 
 /// The whole page.
 [[nodiscard]] std::string ToHtml(const HtmlInput& input);
+
+/// A section in which a mechanism moves through `X_WB` (per frame, per body; at `time_s`), with the
+/// script that it needs. One on a page.
+void AddReplay(const Mechanism& mechanism, const std::vector<std::vector<Pose>>& X_WB,
+               const std::vector<double>& time_s, std::map<std::string, HtmlPaint> paints,
+               const std::string& title, const std::string& remark, Page* page, PageHead* head);
 
 /// The data that the page's script reads: signals, errors and the replay (JSON; arrays of
 /// little-endian 32-bit floats in base64). No '<' occurs in it.

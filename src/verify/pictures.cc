@@ -1,4 +1,5 @@
 #include "verify/pictures.h"
+#include "render/scene.h"
 
 #include <fmt/format.h>
 
@@ -94,6 +95,20 @@ void AddGhosts(const SnapshotSettings& settings, const Mechanism& mechanism,
 std::string SnapshotName(double t_s) { return fmt::format("t_{:.3f}s", t_s); }
 
 }  // namespace
+
+std::map<std::string, HtmlPaint> PaintsOf(const Mechanism& mechanism) {
+  std::map<std::string, HtmlPaint> paints;
+  const auto add = [&](const std::string& color) {
+    paints[color] = {.rgba = render::MaterialOf(color).rgba, .scenery = render::IsScenery(color)};
+  };
+  for (const Body& body : mechanism.bodies) {
+    for (const Shape& shape : body.shapes) add(shape.color);
+  }
+  for (const char* mark : {"grey", "dark_steel", "light_grey", "push", "pull", "closure"}) {
+    add(mark);
+  }
+  return paints;
+}
 
 int NearestSample(const std::vector<double>& times_s, double t_s) {
   const auto nearer = [&](double a, double b) { return std::abs(a - t_s) < std::abs(b - t_s); };

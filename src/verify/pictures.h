@@ -2,12 +2,14 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "base/run_summary.h"
 #include "mechanism/mechanism.h"
 #include "render/render.h"
+#include "report/html_report.h"
 #include "report/report.h"
 #include "scenario/scenario.h"
 #include "simulation/engine/simulation.h"
@@ -23,6 +25,9 @@ struct PictureFile {
 
 /// Title and status of a run's pictures; the time is added to the detail of each.
 [[nodiscard]] Caption CaptionOf(const Report& report);
+
+/// How a page draws the shapes of a mechanism.
+[[nodiscard]] std::map<std::string, HtmlPaint> PaintsOf(const Mechanism& mechanism);
 
 /// Index of the sample nearest to a time.
 [[nodiscard]] int NearestSample(const std::vector<double>& times_s, double t_s);

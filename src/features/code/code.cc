@@ -445,77 +445,22 @@ bool CodeResult::agrees() const {
 std::optional<CodeTask> ChooseCodeTask(const Mechanism& mechanism,
                                        const std::vector<std::string>& coordinates,
                                        Diagnostics* diagnostics) {
+  std::vector<Coordinate> first;
+  for (int c = 0; c < 6 && !mechanism.outputs.empty(); ++c) {
+    first.push_back({Coordinate::Kind::kOutput, 0, c});
+  }
+  const auto chosen = ChooseNamedCoordinates(mechanism, coordinates, first, diagnostics);
+  if (!chosen) return std::nullopt;
   CodeTask task;
-  const std::vector<NamedCoordinate> all = NamedMotionCoordinates(mechanism);
-  const std::vector<std::string> names = NamesOf(all);
-  const auto error = [&](const std::string& message, const std::string& hint) {
-    diagnostics->AddError(mechanism.file, message, hint);
-    return std::nullopt;
-  };
-  for (const NamedCoordinate& at : all) {
-    if (at.coordinate.kind != Coordinate::Kind::kPrescribed) continue;
-    (Contains(coordinates, at.name) ? task.actuators : task.held).push_back(at);
-  }
-  std::vector<NamedCoordinate> candidates = task.held;
-  for (const std::string& name : coordinates) {
-    const auto at = std::ranges::find(all, name, &NamedCoordinate::name);
-    if (at == all.end()) {
-      return error("there is no coordinate '" + name + "'",
-                   DidYouMean(name, names, "there are: " + Joined(names, kNamed)));
-    }
-    if (std::ranges::find(candidates, name, &NamedCoordinate::name) != candidates.end()) {
-      return error("coordinate '" + name + "' is chosen twice", "each once");
-    }
-    candidates.push_back(*at);
-  }
-  if (coordinates.empty()) {
-    for (const NamedCoordinate& at : all) {
-      if (at.coordinate.kind == Coordinate::Kind::kOutput && at.coordinate.index == 0) {
-        candidates.push_back(at);
-      }
-    }
-  }
-  size_t preferred = candidates.size();
-  for (const NamedCoordinate& at : all) {
-    if (std::ranges::find(candidates, at.name, &NamedCoordinate::name) != candidates.end())
-      continue;
-    if (at.coordinate.kind == Coordinate::Kind::kDrive && coordinates.empty()) {
-      candidates.insert(candidates.begin() + static_cast<std::ptrdiff_t>(preferred++), at);
-    } else {
-      candidates.push_back(at);
-    }
-  }
-  std::vector<Coordinate> at;
-  at.reserve(candidates.size());
-  for (const NamedCoordinate& candidate : candidates) at.push_back(candidate.coordinate);
-  const CoordinateChoice choice = ChooseCoordinates(mechanism, at, preferred);
-  std::vector<std::string> chosen, depend;
-  for (const size_t k : choice.chosen) {
-    if (k < task.held.size()) continue;
-    chosen.push_back(candidates[k].name);
-    task.coordinates.push_back(candidates[k]);
-  }
-  for (const size_t k : choice.dependent) depend.push_back(candidates[k].name);
-  const bool all_chosen =
-      std::ranges::all_of(choice.chosen, [&](size_t k) { return k < preferred; });
-  if (!coordinates.empty() && (!depend.empty() || !all_chosen)) {
-    return error(depend.empty()
-                     ? fmt::format("{} has {} degrees of freedom, of which {} are held or chosen",
-                                   mechanism.name, choice.dofs, preferred)
-                     : "at home these depend on those before: " + Joined(depend, kNamed),
-                 "a set that does: " + Joined(chosen, kNamed));
-  }
-  if (choice.left() > 0 || task.coordinates.empty()) {
-    return error("no set of coordinates holds the mechanism at home",
-                 "a mechanism whose motion coordinates of joints, drives or outputs determine");
-  }
+  task.coordinates = chosen->coordinates;
+  task.held = chosen->held;
   for (size_t d = 0; d < mechanism.drives.size(); ++d) {
     task.actuators.push_back(
         {mechanism.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
   }
-  std::rotate(task.actuators.begin(),
-              task.actuators.end() - static_cast<std::ptrdiff_t>(mechanism.drives.size()),
-              task.actuators.end());
+  for (const NamedCoordinate& at : chosen->coordinates) {
+    if (at.coordinate.kind == Coordinate::Kind::kPrescribed) task.actuators.push_back(at);
+  }
   return task;
 }
 

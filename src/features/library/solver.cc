@@ -440,6 +440,17 @@ Status Solver::DriveJacobian(const VecX& q, MatX* J) {
   return StatusOf(summary);
 }
 
+Status Solver::ForceDerivatives(const VecX& q, const VecX& v, const VecX& a, ForceSlopes* slopes) {
+  RunSummary summary = impl_->GoTo(q, v, a);
+  if (summary.ok()) summary = impl_->FindMotions();
+  mbv::ForceDerivatives found;
+  if (summary.ok()) summary = impl_->reduced.Derivatives(impl_->T, {}, &found);
+  if (summary.ok()) {
+    *slopes = {found.by_position, found.by_velocity, found.by_acceleration};
+  }
+  return StatusOf(summary);
+}
+
 Status Solver::MassMatrix(const VecX& q, MatX* M) {
   const RunSummary summary = impl_->MotionsAt(q, impl_->Zero());
   if (summary.ok()) *M = impl_->reduced.MassMatrix(impl_->T);

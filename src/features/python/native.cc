@@ -322,6 +322,18 @@ void DefineSolver(py::module_& m) {
       .def("mass_matrix", with_matrix(&Solver::MassMatrix), "q"_a,
            "M of M a + bias = J_dᵀ (drive forces), n × n.")
       .def(
+          "force_derivatives",
+          [](Solver* solver, const Array& q, const std::optional<Array>& v,
+             const std::optional<Array>& a) {
+            Solver::ForceSlopes slopes;
+            Check(solver->ForceDerivatives(Vector(q), VectorOr0(v, solver->size()),
+                                           VectorOr0(a, solver->size()), &slopes));
+            return py::make_tuple(RowMajor(slopes.by_position), RowMajor(slopes.by_velocity),
+                                  RowMajor(slopes.by_acceleration));
+          },
+          "q"_a, "v"_a = py::none(), "a"_a = py::none(),
+          "∂f/∂q, ∂f/∂v, ∂f/∂a of f = M a + bias, n × n each, columns per coordinate.")
+      .def(
           "bias",
           [](Solver* solver, const Array& q, const Array& v) {
             Eigen::VectorXd bias;

@@ -31,7 +31,6 @@
 #include "mechanism/reach.h"
 #include "model_file/yaml/parsed_documents.h"
 #include "reference/reference.h"
-#include "render/scene.h"
 #include "report/data/data_file.h"
 #include "report/html_report.h"
 #include "report/report.h"
@@ -721,20 +720,6 @@ std::optional<HtmlAudit> AuditOf(const Report& report, const std::string& kept) 
     }
   }
   return {};
-}
-
-std::map<std::string, HtmlPaint> PaintsOf(const Mechanism& mechanism) {
-  std::map<std::string, HtmlPaint> paints;
-  const auto add = [&](const std::string& color) {
-    paints[color] = {.rgba = render::MaterialOf(color).rgba, .scenery = render::IsScenery(color)};
-  };
-  for (const Body& body : mechanism.bodies) {
-    for (const Shape& shape : body.shapes) add(shape.color);
-  }
-  for (const char* mark : {"grey", "dark_steel", "light_grey", "push", "pull", "closure"}) {
-    add(mark);
-  }
-  return paints;
 }
 
 }  // namespace

@@ -124,6 +124,11 @@ class Start {
 
 }  // namespace
 
+bool PutStates(const EngineModel& engine, const Motion& motion, const BodyStates& states,
+               mjData* d) {
+  return Start(engine, motion, states, d).Put();
+}
+
 RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
   const BodyStates& start = s->options.start;
   if (start.X_WB.size() != s->engine.mechanism->bodies.size()) {
@@ -131,7 +136,7 @@ RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
             .message = "a free motion needs the states of all bodies at its start",
             .time_s = 0.0};
   }
-  if (!Start(s->engine, s->motion, start, s->data.get()).Put()) {
+  if (!PutStates(s->engine, s->motion, start, s->data.get())) {
     return {
         .stop = Stop::kUnsupported,
         .message =

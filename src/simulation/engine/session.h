@@ -182,6 +182,10 @@ class LoopClock {
 [[nodiscard]] RunSummary RunCorrected(Session* session, const DrivenMotion& driven);
 [[nodiscard]] RunSummary RunStock(Session* session, const DrivenMotion& driven);
 
+/// MuJoCo's coordinates and velocities of body states. False if a joint has coordinates that body
+/// states do not give one by one.
+[[nodiscard]] bool PutStates(const EngineModel& engine, const Motion& motion,
+                             const BodyStates& states, mjData* d);
 /// Start of a free motion: options.start on the loops, prescribed coordinates at `first`.
 [[nodiscard]] RunSummary PutAtFreeStart(Session* session, const DrivenSample& first);
 

@@ -373,6 +373,26 @@ class Commands(unittest.TestCase):
         self.assertAlmostEqual(volume, 6.4e-5, delta=flooded["error"])
         self.assertLess(flooded["error"], 0.1 * 6.4e-5)
 
+    def test_derivatives_are_those_of_the_solver(self):
+        result = mbverify.linearise("stewart", at={"leg1.length_mm": 620}, rates={"leg2.length": 0.3})
+        self.assertTrue(result.agrees)
+        self.assertEqual(len(result.frequencies), result.shapes.shape[1])
+        summary = result.summary
+        solver = mbverify.load("stewart").solver(result.coordinates)
+        q, v, a = (np.array(summary[key]) for key in ("position", "rate", "acceleration"))
+        for name, matrix in zip(("f_q", "f_v", "f_a"), solver.force_derivatives(q, v, a)):
+            scale = np.abs(matrix).max()
+            self.assertLess(np.abs(result.matrix(name) - matrix).max(), 1e-9 * scale)
+        # A difference of forces, and what a wrong one would be.
+        h = 1e-5 * np.eye(len(q))[2]
+        force = lambda at: np.array(solver.mass_matrix(at) @ a + solver.bias(at, v))
+        slope = (force(q + h) - force(q - h)) / 2e-5
+        mine = result.matrix("f_q")[:, 2]
+        self.assertLess(np.abs(slope - mine).max(), 1e-6 * np.abs(mine).max())
+        self.assertGreater(np.abs(slope - 1.001 * mine).max(), 1e-6 * np.abs(mine).max())
+        with self.assertRaises(mbverify.InputError):
+            mbverify.linearise("stewart", at={"leg9": 1})
+
     def test_a_wrong_number_is_a_verdict(self):
         result = mbverify.run("four_bar/static", set={"simulation.parameters": "{rho: 2.1}"})
         self.assertEqual(result.verdict, "disagree")

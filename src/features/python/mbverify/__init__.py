@@ -6,8 +6,8 @@
     solver = mbverify.load("stewart").solver()        # the solver object, in the drives
     forces = solver.inverse_dynamics(solver.home)     # of this state
 
-SI units and radians. `run`, `audit`, `study`, `workspace` and `figures` start the program: their
-results are its files, and a file that ends the program ends no interpreter.
+SI units and radians. `run`, `audit`, `study`, `workspace`, `linearise` and `figures` start the
+program: their results are its files, and a file that ends the program ends no interpreter.
 """
 
 from ._native import (
@@ -27,12 +27,14 @@ from ._native import (
     load,
 )
 from ._program import (
+    Linearisation,
     ProgramError,
     Result,
     StudyResult,
     WorkspaceResult,
     audit,
     figures,
+    linearise,
     program,
     run,
     study,
@@ -44,6 +46,7 @@ __all__ = [
     "Finding",
     "Forces",
     "InputError",
+    "Linearisation",
     "Model",
     "PaperEquations",
     "ProgramError",
@@ -59,6 +62,7 @@ __all__ = [
     "Wrench",
     "audit",
     "figures",
+    "linearise",
     "load",
     "program",
     "run",

@@ -393,6 +393,88 @@ def workspace(
     return WorkspaceResult(document, place, folder, text)
 
 
+class Linearisation(_Result):
+    """What `mbverify linearise` says of a mechanism about a state: `summary` is its JSON, `folder`
+    has its files. SI units and radians."""
+
+    @property
+    def agrees(self):
+        """Whether all ways to the derivatives agree."""
+        return self.summary["agree"]
+
+    @property
+    def coordinates(self):
+        """Their names: the order of rows and columns."""
+        return self.summary["coordinates"]
+
+    def matrix(self, name):
+        """`A`, `B`, `M`, `K`, `D`, `J_d`, `f_q`, `f_v` or `f_a` as an array."""
+        return numpy.array(self.summary[name], dtype=float)
+
+    @property
+    def eigenvalues(self):
+        """One per mode, with imaginary parts of at least 0 [1/s]."""
+        return numpy.array([complex(*mode["eigenvalue"]) for mode in self.summary["modes"]])
+
+    @property
+    def frequencies(self):
+        """Of the modes [Hz]."""
+        return numpy.array([mode["frequency_hz"] for mode in self.summary["modes"]])
+
+    @property
+    def shapes(self):
+        """Columns: the modes in the coordinates (complex)."""
+        return numpy.array(
+            [
+                numpy.array(mode["shape_real"]) + 1j * numpy.array(mode["shape_imaginary"])
+                for mode in self.summary["modes"]
+            ]
+        ).T
+
+    def __repr__(self):
+        how = "agree" if self.agrees else "disagree"
+        return f"<mbverify.Linearisation of {self.summary['mechanism']}: {how}>"
+
+
+def linearise(
+    model,
+    *,
+    coordinates=(),
+    at=None,
+    rates=None,
+    forces=None,
+    no_forces=False,
+    equilibrium=False,
+    servos=False,
+    set=None,
+    out=None,
+):
+    """A mechanism about a state; its Linearisation.
+
+    `at`, `rates` and `forces` (of drives): {name: value}; names of `at` and `rates` may end in _mm
+    or _deg. Raises InputError for bad input.
+    """
+    folder = _Folder(out)
+    options = []
+    for option, values in (("--at", at), ("--rate", rates), ("--force", forces)):
+        for name, value in (values or {}).items():
+            options += [option, f"{name}={float(value)!r}"]
+    for name in coordinates:
+        options += ["--coordinates", name]
+    for option, wanted in (
+        ("--no-forces", no_forces),
+        ("--equilibrium", equilibrium),
+        ("--servos", servos),
+    ):
+        if wanted:
+            options.append(option)
+    document, _, text = _call(
+        "linearise", model, *options, *_set(set), "--out", folder.path, allowed=(0, 1)
+    )
+    place = folder.path / document["mechanism"] / "linearise"
+    return Linearisation(document, place, folder, text)
+
+
 def figures(
     scenario, *, out, formats=("pdf", "svg"), style=None, only=(), set=None, trust=False
 ):

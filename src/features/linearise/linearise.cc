@@ -1,0 +1,591 @@
+#include "features/linearise/linearise.h"
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <tuple>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "kinematics/command_rank.h"
+#include "math/ridders.h"
+#include "mechanism/reach.h"
+#include "simulation/engine/engine_derivatives.h"
+
+namespace mbv {
+namespace {
+
+constexpr double kDualLimit = 1e-10, kDifferenceLimit = 1e-7;
+// Derivatives lose as many digits as the squared distance from singular loops has.
+constexpr double kRounding = 100.0 * kEps;
+// Eigenvalues of matrices are known to this share of the largest.
+constexpr double kNoEigenvalue = 1e-9;
+constexpr double kExplained = 0.01;   // of an error, is left when a term explains it
+constexpr double kShown = 0.05;       // of the characteristic length or of a radian, in pictures
+constexpr int kMostSteps = 50;        // towards an equilibrium
+constexpr double kBalanced = 1e-12;   // of the largest force
+constexpr double kLeastShare = 1e-6;  // of weights: a scale where no force is
+constexpr double kFirstStep = 0.01;   // of differences, in units of lengths and angles
+
+class Lineariser {
+ public:
+  Lineariser(const Mechanism& mechanism, const LinearSettings& settings)
+      : mechanism_(mechanism), settings_(settings) {}
+
+  Linearisation Run() {
+    if (Choose() && Place() && Differentiate()) {
+      Compare();
+      Assemble();
+      FindModes();
+      Check();
+      AskEngine();
+    }
+    return std::move(out_);
+  }
+
+ private:
+  bool Refuse(const std::string& message, const std::string& hint) {
+    out_.diagnostics.AddError(mechanism_.file, message, hint);
+    return false;
+  }
+  bool Refuse(const RunSummary& summary) { return Refuse(summary.message, ""); }
+
+  bool Choose() {
+    const auto chosen =
+        ChooseNamedCoordinates(mechanism_, settings_.coordinates, {}, &out_.diagnostics);
+    if (!chosen) return false;
+    out_.coordinates = chosen->coordinates, out_.held = chosen->held;
+    out_.check_limit = settings_.check_limit;
+    std::vector<Coordinate> coordinates;
+    for (const NamedCoordinate& at : out_.coordinates) coordinates.push_back(at.coordinate);
+    model_.emplace(mechanism_, coordinates);
+    n_ = static_cast<Eigen::Index>(coordinates.size());
+    const double length = CharacteristicLength(mechanism_);
+    unit_.resize(n_), q_ = model_->home(), v_ = VecX::Zero(n_);
+    const std::vector<std::string> names = NamesOf(out_.coordinates);
+    for (Eigen::Index k = 0; k < n_; ++k) {
+      unit_[k] = IsLength(mechanism_, coordinates[static_cast<size_t>(k)]) ? length : 1.0;
+    }
+    for (const auto& [values, into] : {std::pair(&settings_.at, &q_), {&settings_.rates, &v_}}) {
+      for (const auto& [name, value] : *values) {
+        const auto at = std::ranges::find(names, name);
+        if (at == names.end()) {
+          return Refuse("'" + name + "' is none of the coordinates: " + Joined(names, 8),
+                        "choose it: --coordinates " + name + ",…");
+        }
+        (*into)[at - names.begin()] = value;
+      }
+    }
+    out_.drives = NamesOf(mechanism_.drives);
+    for (const NamedCoordinate& held : out_.held) {
+      out_.notes.push_back("held at home: " + held.name);
+    }
+    return ReadForces();
+  }
+
+  bool ReadForces() {
+    const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
+    forces_given_ = settings_.no_forces || !settings_.forces.empty() || drives == 0;
+    out_.drive_force = VecX::Zero(drives);
+    for (const auto& [name, value] : settings_.forces) {
+      const int at = mechanism_.FindDrive(name);
+      if (at < 0) {
+        return Refuse("there is no drive '" + name + "'",
+                      DidYouMean(name, out_.drives, "there are: " + Joined(out_.drives, 8)));
+      }
+      out_.drive_force[at] = value;
+    }
+    if (!settings_.servos) return true;
+    std::vector<std::string> rigid;
+    stiffness_.resize(drives);
+    for (Eigen::Index d = 0; d < drives; ++d) {
+      const Drive& drive = mechanism_.drives[static_cast<size_t>(d)];
+      stiffness_[d] = drive.stiffness;
+      if (!std::isfinite(drive.stiffness)) rigid.push_back(drive.name);
+    }
+    if (rigid.empty() && drives > 0) return true;
+    return Refuse(drives == 0 ? "--servos: the model has no drives"
+                              : "--servos: no stiffness is stated of " + Joined(rigid, 8),
+                  "stiffness: of each drive in the model (N/m or N m/rad)");
+  }
+
+  // f = M a + h there, with T; false after a finding.
+  bool MoveTo(const VecX& q, const VecX& v, const VecX& a, VecX* f) {
+    RunSummary summary = model_->Move(q, v, a);
+    if (summary.ok()) summary = model_->Motions(&T_);
+    if (!summary.ok()) return Refuse(summary);
+    *f = model_->Forces(T_, {});
+    return true;
+  }
+
+  [[nodiscard]] VecX Size(const VecX& f) const { return f.cwiseProduct(unit_); }
+
+  bool Place() {
+    VecX f;
+    const VecX none = VecX::Zero(n_);
+    model_->Explain(false);
+    if (!MoveTo(q_, v_, none, &f)) return false;
+    if (settings_.equilibrium && !Settle(&f)) return false;
+    MatX rates = model_->DriveRates(T_);
+    if (!forces_given_) {
+      // The forces of least norm that balance f best, in units of their own.
+      const MatX scaled = unit_.asDiagonal() * rates.transpose();
+      out_.drive_force = scaled.completeOrthogonalDecomposition().solve(unit_.asDiagonal() * f);
+    }
+    const VecX rest = rates.transpose() * out_.drive_force - f;
+    ForceDerivatives slopes;
+    if (RunSummary summary = model_->Derivatives(T_, {}, &slopes); !summary.ok()) {
+      return Refuse(summary);
+    }
+    // Where all forces vanish: beside what a radian, or a characteristic length, makes of them.
+    const double largest =
+        std::max({Size(f).cwiseAbs().maxCoeff(),
+                  Size(rates.transpose() * out_.drive_force).cwiseAbs().maxCoeff(),
+                  Largest(StiffnessOf(slopes))});
+    out_.imbalance = largest > 0.0 ? Size(rest).cwiseAbs().maxCoeff() / largest : 0.0;
+    VecX a = none;
+    if (out_.imbalance > kBalanced) {
+      const RunSummary summary = model_->Accelerations(T_, {}, out_.drive_force, &a);
+      if (!summary.ok()) return Refuse(summary);
+      out_.notes.push_back(fmt::format(
+          "the state is no equilibrium: what the drives leave of the forces accelerates it ({:.2g} "
+          "of the largest); --equilibrium searches one near it",
+          out_.imbalance));
+    }
+    out_.q = q_, out_.v = v_, out_.a = a;
+    return MoveTo(q_, v_, a, &f);
+  }
+
+  // Newton's method on J_dᵀ τ = f(q, 0, 0), steps halved until less is out of balance.
+  bool Settle(VecX* f) {
+    if (!v_.isZero(0.0)) return Refuse("--equilibrium: rates are stated", "an equilibrium rests");
+    if (!forces_given_) return true;  // the drives hold whatever is asked
+    // Of what is out of balance.
+    const auto open = [&] {
+      return VecX(model_->DriveRates(T_).transpose() * out_.drive_force - *f);
+    };
+    const VecX none = VecX::Zero(n_);
+    VecX rest = open();
+    double size = Size(rest).norm(), scale = std::max(size, Size(*f).norm());
+    for (int k = 0; k < kMostSteps && size > kBalanced * scale; ++k) {
+      ForceDerivatives slopes;
+      if (RunSummary summary = model_->Derivatives(T_, {}, &slopes); !summary.ok()) {
+        return Refuse(summary);
+      }
+      const MatX scaled = unit_.asDiagonal() * StiffnessOf(slopes) * unit_.asDiagonal();
+      const VecX step =
+          unit_.asDiagonal() * scaled.colPivHouseholderQr().solve(unit_.asDiagonal() * rest);
+      double share = 1.0;
+      bool better = false;
+      for (; share > 1e-6 && !better; share *= 0.5) {
+        const VecX next = q_ + share * step;
+        RunSummary summary = model_->Move(next, none, none);
+        if (summary.ok()) summary = model_->Motions(&T_);
+        if (!summary.ok()) {
+          (void)MoveTo(q_, none, none, f);
+          continue;
+        }
+        *f = model_->Forces(T_, {});
+        const VecX left = open();
+        if (!(Size(left).norm() < size)) continue;
+        rest = left, size = Size(rest).norm(), q_ = next, better = true;
+      }
+      if (!better) break;
+      scale = std::max(scale, Size(*f).norm());
+    }
+    if (size <= 1e-9 * scale) return MoveTo(q_, none, none, f);
+    return Refuse(fmt::format("no equilibrium is found near this state: {:.2g} of the forces stay "
+                              "out of balance",
+                              size / scale),
+                  "another --at, or forces of drives with --force");
+  }
+
+  // ∂f/∂q less what the drives' forces change.
+  [[nodiscard]] MatX StiffnessOf(const ForceDerivatives& slopes) const {
+    MatX K = slopes.by_position;
+    for (Eigen::Index k = 0; k < n_; ++k) {
+      K.col(k) -= slopes.drive_rate_slopes[static_cast<size_t>(k)].transpose() * out_.drive_force;
+    }
+    if (stiffness_.size() > 0) {
+      K += slopes.drive_rates.transpose() * stiffness_.asDiagonal() * slopes.drive_rates;
+    }
+    return K;
+  }
+
+  bool Differentiate() {
+    out_.control = model_->sample().control;
+    RunSummary summary = model_->Derivatives(T_, {}, &out_.by_reference);
+    if (!summary.ok()) return Refuse(summary);
+    // Commands that hold the state, with the joints that are held.
+    Motion motion;
+    for (const auto* list : {&out_.coordinates, &out_.held}) {
+      for (const NamedCoordinate& at : *list) {
+        motion.commands.push_back({.name = at.name, .terms = {{at.coordinate, 1.0}}});
+      }
+    }
+    const auto all = static_cast<Eigen::Index>(motion.commands.size());
+    CommandSample command;
+    for (const auto& [into, from] : {std::pair(&command.position, &out_.q),
+                                     {&command.velocity, &out_.v},
+                                     {&command.acceleration, &out_.a}}) {
+      *into = VecX::Zero(all);
+      into->head(n_) = *from;
+    }
+    for (Eigen::Index k = n_; k < all; ++k) {
+      command.position[k] =
+          HomeValue(mechanism_, out_.held[static_cast<size_t>(k - n_)].coordinate);
+    }
+    ExactDerivatives& dual = out_.by_dual_numbers;
+    const std::string trouble =
+        DifferentiateExactly(mechanism_, motion, model_->states(), command, &dual);
+    if (!trouble.empty()) return Refuse("by dual numbers: " + trouble, "a state farther from it");
+    for (MatX* matrix : {&dual.by_position, &dual.by_velocity, &dual.by_acceleration}) {
+      *matrix = matrix->topLeftCorner(n_, n_).eval();
+    }
+    dual.force.conservativeResize(n_);
+    TakeDifferences();
+    return true;
+  }
+
+  void TakeDifferences() {
+    VecX q = out_.q, v = out_.v, a = out_.a;
+    ForceDerivatives& by = out_.by_differences;
+    const double speed = std::max(1.0, v.cwiseQuotient(unit_).cwiseAbs().maxCoeff());
+    for (const auto& [of, matrix, step] :
+         {std::tuple(&q, &by.by_position, kFirstStep), std::tuple(&v, &by.by_velocity, 0.1 * speed),
+          std::tuple(&a, &by.by_acceleration, speed * speed)}) {
+      matrix->resize(n_, n_);
+      for (Eigen::Index k = 0; k < n_; ++k) {
+        const double at = (*of)[k];
+        matrix->col(k) = SlopesAt(
+            [&, of = of](double x) {
+              (*of)[k] = x;
+              return ForceAt(q, v, a);
+            },
+            at, step * unit_[k]);
+        (*of)[k] = at;
+      }
+    }
+    (void)ForceAt(q, v, a);
+  }
+  VecX ForceAt(const VecX& q, const VecX& v, const VecX& a) {
+    MatX T;
+    if (!model_->Move(q, v, a).ok() || !model_->Motions(&T).ok()) return VecX::Constant(n_, kNan);
+    return model_->Forces(T, {});
+  }
+
+  [[nodiscard]] double Largest(const MatX& x) const {
+    return x.cwiseProduct(unit_ * unit_.transpose()).cwiseAbs().maxCoeff();
+  }
+
+  // Errors relate to the largest entry of the matrix. One that vanishes is small beside what the
+  // others make of it in the time of their own, √(|f_a|/|f_q|) or |f_a|/|f_v|, and ∂f/∂q also
+  // beside the forces themselves and a share of the weights, or of what one unit per s² needs.
+  void Compare() {
+    const ForceDerivatives& by = out_.by_reference;
+    double weight = 0.0;
+    for (const Body& body : mechanism_.bodies) weight += body.mass * mechanism_.gravity_W.norm();
+    const double q = Largest(by.by_position), v = Largest(by.by_velocity),
+                 a = Largest(by.by_acceleration);
+    const double scale_q = std::max(
+        {q, a > 0.0 ? v * v / a : 0.0, Size(out_.by_dual_numbers.force).cwiseAbs().maxCoeff(),
+         kLeastShare * std::max(weight * CharacteristicLength(mechanism_), a)});
+    const double scale_v = std::max(v, std::sqrt(scale_q * a));
+    const auto worst = [&](const MatX& of_q, const MatX& of_v, const MatX& of_a) {
+      double most = 0.0;
+      for (const auto& [x, y, scale] : {std::tuple(&of_q, &by.by_position, scale_q),
+                                        std::tuple(&of_v, &by.by_velocity, scale_v),
+                                        std::tuple(&of_a, &by.by_acceleration, a)}) {
+        const double off = (*x - *y).allFinite() ? Largest(*x - *y) : kInfinity;
+        if (off > 0.0) most = std::max(most, scale > 0.0 ? off / scale : kInfinity);
+      }
+      return most;
+    };
+    const ExactDerivatives& dual = out_.by_dual_numbers;
+    out_.dual_error = worst(dual.by_position, dual.by_velocity, dual.by_acceleration);
+    const ForceDerivatives& differences = out_.by_differences;
+    out_.difference_error =
+        worst(differences.by_position, differences.by_velocity, differences.by_acceleration);
+    const double open = kRounding / (out_.control * out_.control);
+    out_.dual_limit = kDualLimit + open;
+    out_.difference_limit = kDifferenceLimit + open;
+  }
+
+  void Assemble() {
+    const ForceDerivatives& by = out_.by_reference;
+    out_.mass = 0.5 * (by.by_acceleration + by.by_acceleration.transpose());
+    out_.K = StiffnessOf(by);
+    out_.D = by.by_velocity;
+    MotionDerivatives motion;
+    regular_ = MakeMotionDerivatives(by, out_.drive_force, &motion);
+    if (!regular_) {
+      out_.notes.emplace_back("a motion of the coordinates moves no mass: there is no A, no mode");
+      return;
+    }
+    const Eigen::LLT<MatX> mass(out_.mass);
+    out_.A = MatX::Zero(2 * n_, 2 * n_);
+    out_.A.topRightCorner(n_, n_).setIdentity();
+    out_.A.bottomLeftCorner(n_, n_) = motion.by_position;
+    if (stiffness_.size() > 0) {
+      out_.A.bottomLeftCorner(n_, n_) -=
+          mass.solve(MatX(by.drive_rates.transpose() * stiffness_.asDiagonal() * by.drive_rates));
+    }
+    out_.A.bottomRightCorner(n_, n_) = motion.by_velocity;
+    out_.B = MatX::Zero(2 * n_, motion.by_force.cols());
+    out_.B.bottomRows(n_) = motion.by_force;
+  }
+
+  // With M = L Lᵀ and y = Lᵀ δq; without damping −λ² are the eigenvalues of L⁻¹ K L⁻ᵀ.
+  void FindModes() {
+    if (!regular_) return;
+    const Eigen::LLT<MatX> mass(out_.mass);
+    const auto turned = [&](const MatX& by) {
+      const MatX left = mass.matrixL().solve(by);
+      return MatX(mass.matrixL().solve(left.transpose()).transpose());
+    };
+    const MatX K = turned(out_.K), D = turned(out_.D);
+    const double fast = std::sqrt(K.norm());
+    if (D.norm() <= kNoEigenvalue * fast) {
+      const Eigen::EigenSolver<MatX> eigen(K);
+      for (Eigen::Index k = 0; k < n_; ++k) {
+        const std::complex<double> square = -eigen.eigenvalues()[k];
+        std::complex<double> root = std::sqrt(square);
+        if (std::abs(square) <= kNoEigenvalue * K.norm()) root = 0.0;
+        if (root.imag() < 0.0) root = -root;
+        root = {root.real(), std::abs(root.imag())};
+        AddMode(root, mass.matrixU().solve(eigen.eigenvectors().col(k).real()).eval() +
+                          std::complex<double>(0.0, 1.0) *
+                              mass.matrixU().solve(eigen.eigenvectors().col(k).imag()).eval());
+      }
+    } else {
+      MatX A = MatX::Zero(2 * n_, 2 * n_);
+      A.topRightCorner(n_, n_).setIdentity();
+      A.bottomLeftCorner(n_, n_) = -K, A.bottomRightCorner(n_, n_) = -D;
+      const Eigen::EigenSolver<MatX> eigen(A);
+      for (Eigen::Index k = 0; k < 2 * n_; ++k) {
+        const std::complex<double> root = eigen.eigenvalues()[k];
+        if (root.imag() < 0.0) continue;
+        const Eigen::VectorXcd y = eigen.eigenvectors().col(k).head(n_);
+        AddMode(root, mass.matrixU().solve(y.real()).eval() +
+                          std::complex<double>(0.0, 1.0) * mass.matrixU().solve(y.imag()).eval());
+      }
+    }
+    std::ranges::stable_sort(out_.modes, {}, [](const VibrationMode& m) {
+      return std::pair(m.frequency_hz, -m.eigenvalue.real());
+    });
+    for (VibrationMode& mode : out_.modes) Move(&mode);
+  }
+
+  void AddMode(const std::complex<double>& root, const Eigen::VectorXcd& shape) {
+    VibrationMode mode;
+    mode.eigenvalue = root;
+    Eigen::Index largest = 0;
+    const Eigen::VectorXcd scaled = shape.cwiseQuotient(unit_.cast<std::complex<double>>());
+    scaled.cwiseAbs().maxCoeff(&largest);
+    mode.shape = shape / scaled[largest];
+    const double fast = out_.modes.empty() ? 0.0 : std::abs(out_.modes.front().eigenvalue);
+    const double size = std::abs(root);
+    mode.frequency_hz = root.imag() / (2.0 * std::numbers::pi);
+    if (size <= kNoEigenvalue * fast || size == 0.0) {
+      mode.kind = VibrationMode::Kind::kRigid;
+      mode.frequency_hz = 0.0;
+    } else if (root.real() > kNoEigenvalue * size) {
+      mode.kind = VibrationMode::Kind::kGrows;
+    } else if (root.imag() == 0.0) {
+      mode.kind = VibrationMode::Kind::kDecays;
+    }
+    if (root.imag() > 0.0) mode.damping_ratio = -root.real() / size;
+    out_.modes.push_back(std::move(mode));
+  }
+
+  // So far that it can be seen, as far as the loops let it.
+  void Move(VibrationMode* mode) {
+    const VecX none = VecX::Zero(n_);
+    for (double share = kShown; share > 1e-3 * kShown; share *= 0.5) {
+      mode->X_WB.clear();
+      for (int i = 0; i < kModeFrames; ++i) {
+        const double angle = 2.0 * std::numbers::pi * i / kModeFrames;
+        const VecX step = (mode->shape * std::polar(share, angle)).real();
+        if (!model_->Move(out_.q + step, none, none).ok()) break;
+        mode->X_WB.push_back(model_->states().X_WB);
+      }
+      (void)model_->Move(out_.q, none, none);
+      if (mode->X_WB.size() == static_cast<size_t>(kModeFrames)) return;
+    }
+    mode->X_WB.clear();
+  }
+
+  // At rest, where MuJoCo's coordinates vary as the loops let them.
+  void AskEngine() {
+    if (!settings_.mujoco || !regular_) return;
+    MatX T;
+    RunSummary moved = model_->Move(out_.q, VecX::Zero(n_), VecX::Zero(n_));
+    if (moved.ok()) moved = model_->Motions(&T);
+    for (const bool soft : {true, false}) {
+      EngineDerivative engine{.softness =
+                                  soft ? "default softness" : "as stiff as its step allows"};
+      if (!v_.isZero(0.0)) engine.why_not = "the state is in motion";
+      if (stiffness_.size() > 0) engine.why_not = "drives hold their place";
+      if (!moved.ok()) engine.why_not = moved.message;
+      if (engine.why_not.empty()) {
+        const EngineDerivatives by =
+            DifferentiateEngine(mechanism_, model_->states().X_WB, T, out_.drive_force, soft);
+        if (by.summary.ok()) {
+          const MatX q = out_.A.bottomLeftCorner(n_, n_), v = out_.A.bottomRightCorner(n_, n_);
+          const double fast = std::sqrt(InAccelerations(q).cwiseAbs().maxCoeff());
+          const auto apart = [&](const MatX& x, const MatX& y, double least) {
+            return InAccelerations(x - y).cwiseAbs().maxCoeff() /
+                   std::max(InAccelerations(y).cwiseAbs().maxCoeff(), least);
+          };
+          engine.position_error = apart(by.by_position, q, 0.0);
+          engine.velocity_error = apart(by.by_velocity, v, fast);
+        } else {
+          engine.why_not = by.summary.message;
+        }
+      }
+      out_.engines.push_back(std::move(engine));
+    }
+  }
+  [[nodiscard]] MatX InAccelerations(const MatX& x) const {
+    return unit_.cwiseInverse().asDiagonal() * x * unit_.asDiagonal();
+  }
+
+  // Somebody else's matrices.
+  void Check() {
+    if (settings_.check.empty()) return;
+    const auto refuse = [&](const std::string& message, const std::string& hint) {
+      out_.diagnostics.AddError(settings_.check, message, hint);
+    };
+    const auto text = ReadWholeFile(settings_.check);
+    if (!text) return refuse("cannot be read", "a JSON file");
+    const auto json = nlohmann::json::parse(*text, nullptr, false, true);
+    const char* expected =
+        "{\"coordinates\": [names], \"f_q\": [[row], …]} with any of f_q, f_v, f_a (n × n), A (2n "
+        "× 2n) and B (2n × drives)";
+    if (!json.is_object()) return refuse("is no JSON object", expected);
+    if (json.contains("coordinates")) {
+      const std::vector<std::string> names = NamesOf(out_.coordinates);
+      if (json["coordinates"] != nlohmann::json(names)) {
+        return refuse("coordinates are others than these: " + Joined(names, 12),
+                      "the same in this order, or --coordinates");
+      }
+    }
+    const MatX none;
+    const ForceDerivatives& by = out_.by_reference;
+    const std::vector<std::pair<std::string, const MatX*>> known = {{"f_q", &by.by_position},
+                                                                    {"f_v", &by.by_velocity},
+                                                                    {"f_a", &by.by_acceleration},
+                                                                    {"A", &out_.A},
+                                                                    {"B", &out_.B}};
+    for (const auto& [key, value] : json.items()) {
+      if (key == "coordinates") continue;
+      const auto of = std::ranges::find(known, key, &std::pair<std::string, const MatX*>::first);
+      if (of == known.end()) {
+        refuse("there is no matrix '" + key + "'", expected);
+        continue;
+      }
+      MatX theirs;
+      if (!ReadMatrix(value, of->second->rows(), of->second->cols(), &theirs)) {
+        refuse(fmt::format("{}: {} rows of {} finite numbers are needed", key, of->second->rows(),
+                           of->second->cols()),
+               expected);
+        continue;
+      }
+      Judge(key, theirs, *of->second);
+    }
+    if (out_.checks.empty() && !out_.diagnostics.has_errors()) {
+      refuse("has none of the matrices", expected);
+    }
+  }
+
+  static bool ReadMatrix(const nlohmann::json& rows, Eigen::Index m, Eigen::Index n, MatX* out) {
+    out->resize(m, n);
+    if (!rows.is_array() || static_cast<Eigen::Index>(rows.size()) != m) return false;
+    for (Eigen::Index i = 0; i < m; ++i) {
+      const auto& row = rows[static_cast<size_t>(i)];
+      if (!row.is_array() || static_cast<Eigen::Index>(row.size()) != n) return false;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const auto& entry = row[static_cast<size_t>(k)];
+        if (!entry.is_number() || !std::isfinite(entry.get<double>())) return false;
+        (*out)(i, k) = entry.get<double>();
+      }
+    }
+    return true;
+  }
+
+  // Rows and columns in units of lengths and angles; of A's and B's rows accelerations.
+  [[nodiscard]] MatX InUnits(const std::string& key, const MatX& x) const {
+    if (key == "A" || key == "B") {
+      VecX twice(2 * n_);
+      twice << unit_, unit_;
+      const MatX rows = twice.cwiseInverse().asDiagonal() * x;
+      return key == "B" ? rows : MatX(rows * twice.asDiagonal());
+    }
+    return unit_.asDiagonal() * x * unit_.asDiagonal();
+  }
+
+  // What A lacks where ∂f lacks a term.
+  [[nodiscard]] MatX TermOf(const std::string& key, const ForceDerivatives::Term& term) const {
+    if (key == "f_q") return term.by_position;
+    if (key == "f_v") return term.by_velocity;
+    if (key != "A") return {};
+    MatX of = MatX::Zero(2 * n_, 2 * n_);
+    const Eigen::LLT<MatX> mass(out_.mass);
+    of.bottomLeftCorner(n_, n_) = -mass.solve(term.by_position);
+    of.bottomRightCorner(n_, n_) = -mass.solve(term.by_velocity);
+    return of;
+  }
+
+  void Judge(const std::string& key, const MatX& theirs, const MatX& ours) {
+    const MatX off = InUnits(key, theirs - ours);
+    const double largest = InUnits(key, ours).cwiseAbs().maxCoeff();
+    DerivativeCheck check{.matrix = key, .error = 0.0, .explained = ""};
+    const double most = off.size() == 0 ? 0.0 : off.cwiseAbs().maxCoeff();
+    if (most > 0.0) check.error = largest > 0.0 ? most / largest : kInfinity;
+    if (check.error > out_.check_limit) {
+      for (const ForceDerivatives::Term& term : out_.by_reference.terms) {
+        const MatX part = TermOf(key, term);
+        if (part.size() == 0) continue;
+        const MatX scaled = InUnits(key, part);
+        for (const auto& [times, how] :
+             {std::pair(1.0, "is left out: "), std::pair(2.0, "has the wrong sign: ")}) {
+          if ((off + times * scaled).norm() > kExplained * off.norm()) continue;
+          check.explained = std::string(how) + term.name;
+        }
+      }
+    }
+    out_.checks.push_back(std::move(check));
+  }
+
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+  const Mechanism& mechanism_;
+  const LinearSettings& settings_;
+  Linearisation out_;
+  std::optional<ReducedModel> model_;
+  Eigen::Index n_ = 0;
+  VecX unit_, q_, v_, stiffness_;
+  MatX T_;
+  bool forces_given_ = false, regular_ = false;
+};
+
+}  // namespace
+
+bool Linearisation::agrees() const {
+  return witnesses_agree() && std::ranges::all_of(checks, [&](const DerivativeCheck& check) {
+           return check.error <= check_limit;
+         });
+}
+
+Linearisation Linearise(const Mechanism& mechanism, const LinearSettings& settings) {
+  return Lineariser(mechanism, settings).Run();
+}
+
+}  // namespace mbv

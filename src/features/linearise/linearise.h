@@ -1,0 +1,108 @@
+// A mechanism linearised about a state: derivatives of its forces, A and B, natural frequencies and
+// mode shapes.
+//
+// With the reduced model M a + h(q, v) = f(q, v, a) = J_dᵀ τ in chosen coordinates q (reference/
+// reduced_model.h), about a state q, v under drive forces τ and with x = [δq; δv],
+//   ẋ = A x + B δτ,  A = [0 1; ∂a/∂q ∂a/∂v],  B = [0; ∂a/∂τ]                                    (1)
+//   ∂a/∂q = −M⁻¹ K,  K = ∂f/∂q − ∂(J_dᵀ τ)/∂q (+ J_dᵀ diag(k) J_d of servos that hold) (2) ∂a/∂v =
+//   −M⁻¹ D,  D = ∂f/∂v
+// Each eigenvalue σ ± iω of A is a mode: ω/2π is its frequency, −σ/|σ + iω| its damping ratio.
+//
+// ∂f is computed three times: by implicit differentiation of the reference (reference/
+// derivatives.h), by dual numbers through the equations of features/certify, and by extrapolated
+// differences of the reference's forces.
+#pragma once
+
+#include <complex>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/diagnostics.h"
+#include "features/certify/certify.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "reference/reduced_model.h"
+
+namespace mbv {
+
+struct LinearSettings {
+  std::vector<std::string> coordinates;  ///< empty: drives first
+  std::map<std::string, double> at;      ///< of coordinates; others are at home [SI]
+  std::map<std::string, double> rates;
+  /// Of drives; others exert none. Without any, those that hold the state without acceleration, as
+  /// far as they can.
+  std::map<std::string, double> forces;
+  bool no_forces = false;    ///< drives exert none
+  bool equilibrium = false;  ///< searches one near `at` first
+  bool servos = false;       ///< drives hold their place with their stiffness
+  bool mujoco = false;       ///< MuJoCo's own derivative beside ours
+  std::string check;         ///< a JSON file with derivatives to be judged; "": none
+  double check_limit = 1e-6;
+};
+
+struct VibrationMode {
+  std::complex<double> eigenvalue;  ///< [1/s], imaginary part >= 0
+  Eigen::VectorXcd shape;           ///< of the coordinates; the largest is 1 in its unit
+  double frequency_hz = 0.0, damping_ratio = kNan;
+  enum class Kind { kVibrates, kDecays, kGrows, kRigid } kind = Kind::kVibrates;
+  /// The mechanism in it, kModeFrames over one period; loops stay closed.
+  std::vector<std::vector<Pose>> X_WB;
+};
+constexpr int kModeFrames = 24;
+
+/// How far a matrix of somebody else's is off.
+struct DerivativeCheck {
+  std::string matrix;     ///< "f_q", "f_v", "f_a", "A" or "B"
+  double error = kNan;    ///< of its largest entry, in units of lengths and angles
+  std::string explained;  ///< the term that it leaves out or has with the wrong sign; "": none
+};
+
+/// MuJoCo's mjd_transitionFD against A, of the largest entries of ∂a/∂q and ∂a/∂v.
+struct EngineDerivative {
+  std::string softness;  ///< "default softness" or "as stiff as its step allows"
+  double position_error = kNan, velocity_error = kNan;
+  std::string why_not = {};  ///< not empty: there is none
+};
+
+struct Linearisation {
+  Diagnostics diagnostics;
+  std::vector<NamedCoordinate> coordinates, held;
+  std::vector<std::string> drives;
+  VecX q, v, a;            ///< the state; a follows from the forces
+  VecX drive_force;        ///< τ
+  double imbalance = 0.0;  ///< the largest of M a, of the largest force
+  MatX mass, K, D;         ///< of (2)
+  MatX A, B;
+  ForceDerivatives by_reference;
+  ExactDerivatives by_dual_numbers;
+  ForceDerivatives by_differences;  ///< the three matrices alone
+  /// Of the largest entries of ∂f/∂q, ∂f/∂v, ∂f/∂a, in units of lengths and angles.
+  double dual_error = kNan, difference_error = kNan, dual_limit = kNan, difference_limit = kNan;
+  double control = kNan;  ///< smallest singular value of loops and coordinates
+  std::vector<VibrationMode> modes;
+  std::vector<DerivativeCheck> checks;
+  std::vector<EngineDerivative> engines;  ///< judged by nothing
+  std::vector<std::string> notes;         ///< what is left out
+  double check_limit = kNan;
+
+  [[nodiscard]] bool witnesses_agree() const {
+    return dual_error <= dual_limit && difference_error <= difference_limit;
+  }
+  [[nodiscard]] bool agrees() const;
+};
+
+/// The result has findings where there is none.
+[[nodiscard]] Linearisation Linearise(const Mechanism& mechanism, const LinearSettings& settings);
+
+// Writers.
+
+[[nodiscard]] std::string LinearisationText(const Linearisation& result, bool color,
+                                            size_t columns);
+[[nodiscard]] std::string LinearisationPage(const Linearisation& result,
+                                            const Mechanism& mechanism);
+[[nodiscard]] std::string LinearisationJson(const Linearisation& result,
+                                            const std::string& mechanism);
+
+}  // namespace mbv
