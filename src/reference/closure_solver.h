@@ -64,6 +64,8 @@ class ClosureSolver {
   [[nodiscard]] const BodyStates& states() const { return states_; }
   /// Of all joints, couplings, commands and idle spins at the pose of states().
   [[nodiscard]] const RowSet& rows() const { return rows_; }
+  /// The first row of the commands.
+  [[nodiscard]] int first_command() const { return joint_rows_; }
   /// Those of joints and couplings that transmit forces.
   [[nodiscard]] const std::vector<int>& transmitting() const { return transmitting_; }
   /// Rows that are as many as the unknowns.

@@ -16,6 +16,8 @@
 namespace mbv::internal {
 namespace {
 
+constexpr double kSame = 1e-9;  // a drive's row and a coordinate's
+
 // δJ · motion of a varied row.
 double Along(const ScalarRow& varied, const std::vector<Vec6>& motion) {
   return RateOf(varied, motion);
@@ -182,12 +184,13 @@ void ForceVariations::VaryElements(const BodyStates& states, const std::vector<i
     at.acceleration = RateOf(row, states.A_WB) + row.bias;
     at.d_position = RateOf(row, U);
     at.d_rate = Along(varied, states.V_WB) + RateOf(row, dV);
-    // (3) for this row.
-    at.d_acceleration = RateOf(row, dA) + Along(varied, states.A_WB) + varied.bias +
-                        Along(VariedElementRow(mechanism_, e, states, states.V_WB), dV) +
-                        Along(VariedElementRow(mechanism_, e, states, dV), states.V_WB);
-    at.sign = friction_signs.empty() ? 0 : friction_signs[e];
     const auto* rotor = std::get_if<RotorLaw>(&element.law);
+    if (rotor != nullptr) {  // (3) for this row
+      at.d_acceleration = RateOf(row, dA) + Along(varied, states.A_WB) + varied.bias +
+                          Along(VariedElementRow(mechanism_, e, states, states.V_WB), dV) +
+                          Along(VariedElementRow(mechanism_, e, states, dV), states.V_WB);
+    }
+    at.sign = friction_signs.empty() ? 0 : friction_signs[e];
     const bool carried = rotor != nullptr && rotor->carrier.has_value();
     if (carried) {
       const auto b = static_cast<size_t>(rotor->carrier->body);
@@ -265,7 +268,7 @@ void ForceVariations::VaryWrenches(const BodyStates& states, const std::vector<L
 
 RunSummary ForceVariations::Differentiate(ClosureSolver* closure, const MatX& T,
                                           const std::vector<LoadSample>& loads,
-                                          const std::vector<int>& friction_signs,
+                                          const std::vector<int>& friction_signs, bool terms,
                                           ForceDerivatives* out) {
   const BodyStates& states = closure->states();
   rows_ = &closure->rows();
@@ -286,11 +289,9 @@ RunSummary ForceVariations::Differentiate(ClosureSolver* closure, const MatX& T,
   system_.Solve(w, &mu);
   for (Eigen::Index k = 0; k < rows; ++k) full[selection_[static_cast<size_t>(k)]] = mu[k];
 
-  for (MatX* matrix : {&out->by_position, &out->by_velocity, &out->by_acceleration}) {
-    matrix->resize(n, n);
-  }
+  out->by_position.resize(n, n), out->by_velocity.resize(n, n);
   const Twists none(bodies, Vec6::Zero());
-  Twists zero = none, dV = none, dA = none, back = none;
+  Twists dV = none, dA = none, back = none;
   std::vector<Twists> unit(static_cast<size_t>(n), none);
   varied_.resize(static_cast<size_t>(n));
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -301,8 +302,11 @@ RunSummary ForceVariations::Differentiate(ClosureSolver* closure, const MatX& T,
 
   std::array<MatX, 4> of_position;
   std::array<MatX, 2> of_velocity;
-  for (MatX& part : of_position) part.resize(n, n);
-  for (MatX& part : of_velocity) part.resize(n, n);
+  if (terms) {
+    for (MatX& part : of_position) part.resize(n, n);
+    for (MatX& part : of_velocity) part.resize(n, n);
+  }
+  const bool moves = std::ranges::any_of(states.V_WB, [](const Vec6& V) { return !V.isZero(0.0); });
   VecX rates(rows), dw;
   const auto along_T = [&](const Twists& U, const Twists& dv, const Twists& da) {
     VaryWrenches(states, loads, friction_signs, U, dv, da, &dw);
@@ -313,66 +317,98 @@ RunSummary ForceVariations::Differentiate(ClosureSolver* closure, const MatX& T,
     const RowSet& by = varied_[static_cast<size_t>(k)];
     // (2) and (3) of a coordinate.
     rates.setZero();
-    AddRates(by, states.V_WB, false, -1.0, &rates);
-    Solve(rates, &dV);
-    closure->VaryRows(dV, &along_dV_);
-    rates.setZero();
+    if (moves) {
+      AddRates(by, states.V_WB, false, -1.0, &rates);
+      Solve(rates, &dV);
+      closure->VaryRows(dV, &along_dV_);
+      rates.setZero();
+      AddRates(along_V_, dV, false, -1.0, &rates);
+      AddRates(along_dV_, states.V_WB, false, -1.0, &rates);
+    }
     AddRates(by, states.A_WB, true, -1.0, &rates);
-    AddRates(along_V_, dV, false, -1.0, &rates);
-    AddRates(along_dV_, states.V_WB, false, -1.0, &rates);
     Solve(rates, &dA);
     std::fill(back.begin(), back.end(), Vec6::Zero());
     by.AddWrenches(full, &back);
     Stack(back, &dw);
-    of_position[3].col(k) = -T.transpose() * dw;
-    // The gyroscopic and elastic parts are linear in what is varied, and their sum is one call
-    // more than their parts.
-    of_position[0].col(k) = along_T(U, zero, zero);
-    of_position[1].col(k) = along_T(zero, dV, zero);
-    of_position[2].col(k) = along_T(zero, zero, dA);
+    const VecX second = -T.transpose() * dw;
+    out->by_position.col(k) = second + along_T(U, dV, dA);
+    if (terms) {
+      of_position[0].col(k) = along_T(U, none, none);
+      of_position[1].col(k) = along_T(none, dV, none);
+      of_position[2].col(k) = along_T(none, none, dA);
+      of_position[3].col(k) = second;
+    }
     // Of a rate.
     rates.setZero();
-    AddRates(along_V_, U, false, -1.0, &rates);
-    AddRates(by, states.V_WB, false, -1.0, &rates);
+    if (moves) {
+      AddRates(along_V_, U, false, -1.0, &rates);
+      AddRates(by, states.V_WB, false, -1.0, &rates);
+    }
     Solve(rates, &dA);
-    of_velocity[0].col(k) = along_T(zero, U, zero);
-    of_velocity[1].col(k) = along_T(zero, zero, dA);
-    out->by_acceleration.col(k) = along_T(zero, zero, U);
+    out->by_velocity.col(k) = along_T(none, U, dA);
+    if (terms) {
+      of_velocity[0].col(k) = along_T(none, U, none);
+      of_velocity[1].col(k) = along_T(none, none, dA);
+    }
   }
-  out->by_position = of_position[0] + of_position[1] + of_position[2] + of_position[3];
-  out->by_velocity = of_velocity[0] + of_velocity[1];
-  const MatX nothing = MatX::Zero(n, n);
-  out->terms = {
-      {"what poses change of wrenches", of_position[0], nothing},
-      {"what loops change of velocities at other poses (∂J/∂q V)", of_position[1], nothing},
-      {"what loops change of accelerations at other poses (∂(J A + b)/∂q)", of_position[2],
-       nothing},
-      {"second-order term of the constraints ((∂J/∂q)ᵀ λ)", of_position[3], nothing},
-      {"what velocities change of wrenches", nothing, of_velocity[0]},
-      {"what loops change of accelerations at other velocities (∂b/∂v)", nothing, of_velocity[1]},
-  };
+  out->by_acceleration = T.transpose() * Momenta(mechanism_, states, T);
+  out->terms.clear();
+  if (terms) {
+    const MatX nothing = MatX::Zero(n, n);
+    out->terms = {
+        {"what poses change of wrenches", of_position[0], nothing},
+        {"what loops change of velocities at other poses (∂J/∂q V)", of_position[1], nothing},
+        {"what loops change of accelerations at other poses (∂(J A + b)/∂q)", of_position[2],
+         nothing},
+        {"second-order term of the constraints ((∂J/∂q)ᵀ λ)", of_position[3], nothing},
+        {"what velocities change of wrenches", nothing, of_velocity[0]},
+        {"what loops change of accelerations at other velocities (∂b/∂v)", nothing, of_velocity[1]},
+    };
+  }
+  DifferentiateRates(states, T, unit, closure->first_command(), out);
+  return RunSummary::Done();
+}
 
-  // Rates of the drives: δ(row T) = δrow T − ν δJ T with Jᵀ ν = rowᵀ.
+// Of the drives: δ(row T) = δrow T − ν δJ T with Jᵀ ν = rowᵀ.
+void ForceVariations::DifferentiateRates(const BodyStates& states, const MatX& T,
+                                         const std::vector<Twists>& unit, int first_coordinate,
+                                         ForceDerivatives* out) {
   const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
+  const Eigen::Index n = T.cols();
+  MatX nu(static_cast<Eigen::Index>(selection_.size()), drives);
   out->drive_rates.resize(drives, n);
   out->drive_rate_slopes.assign(static_cast<size_t>(n), MatX(drives, n));
   for (Eigen::Index d = 0; d < drives; ++d) {
     const Drive& drive = mechanism_.drives[static_cast<size_t>(d)];
-    const VecX gradient = GradientOf(DriveRow(mechanism_, drive, states), bodies);
-    VecX nu;
-    system_.Solve(gradient, &nu);
+    const VecX gradient = GradientOf(DriveRow(mechanism_, drive, states), mechanism_.bodies.size());
+    system_.Solve(gradient, &step_);
+    nu.col(d) = step_;
     out->drive_rates.row(d) = gradient.transpose() * T;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const ScalarRow by = VariedDriveRow(mechanism_, drive, states, unit[static_cast<size_t>(k)]);
-      MatX& slopes = out->drive_rate_slopes[static_cast<size_t>(k)];
+    // One that is a coordinate itself has a constant rate.
+    Eigen::Index own = 0;
+    step_.cwiseAbs().maxCoeff(&own);
+    step_[own] -= 1.0;
+    if (selection_[static_cast<size_t>(own)] >= first_coordinate && step_.norm() < kSame) {
+      for (MatX& slopes : out->drive_rate_slopes) slopes.row(d).setZero();
+      nu.col(d).setZero();
+      continue;
+    }
+    for (size_t k = 0; k < unit.size(); ++k) {
+      const ScalarRow by = VariedDriveRow(mechanism_, drive, states, unit[k]);
       for (Eigen::Index j = 0; j < n; ++j) {
-        rates.setZero();
-        AddRates(varied_[static_cast<size_t>(k)], unit[static_cast<size_t>(j)], false, 1.0, &rates);
-        slopes(d, j) = Along(by, unit[static_cast<size_t>(j)]) - nu.dot(rates);
+        out->drive_rate_slopes[k](d, j) = Along(by, unit[static_cast<size_t>(j)]);
       }
     }
   }
-  return RunSummary::Done();
+  if (nu.isZero(0.0)) return;
+  VecX rates(nu.rows());
+  for (size_t k = 0; k < unit.size(); ++k) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      rates.setZero();
+      AddRates(varied_[k], unit[static_cast<size_t>(j)], false, 1.0, &rates);
+      out->drive_rate_slopes[k].col(j) -= nu.transpose() * rates;
+    }
+  }
 }
 
 }  // namespace mbv::internal

@@ -29,11 +29,11 @@ class ForceVariations {
  public:
   explicit ForceVariations(const Mechanism& mechanism);
 
-  /// At the state of `closure`, with its T, of which coordinates are the first commands. kSingular
-  /// where the loops do not determine the motion.
+  /// At the state of `closure`, with its T, of which coordinates are the first commands. `terms`:
+  /// with what the sums consist of. kSingular where the loops do not determine the motion.
   [[nodiscard]] RunSummary Differentiate(ClosureSolver* closure, const MatX& T,
                                          const std::vector<LoadSample>& loads,
-                                         const std::vector<int>& friction_signs,
+                                         const std::vector<int>& friction_signs, bool terms,
                                          ForceDerivatives* out);
 
  private:
@@ -51,6 +51,8 @@ class ForceVariations {
   /// Of what follows coordinates: its components vary by this.
   [[nodiscard]] Vec6 VaryFollowing(const BodyStates& states, const LoadSample& sample,
                                    const Twists& U, const Twists& dV) const;
+  void DifferentiateRates(const BodyStates& states, const MatX& T, const std::vector<Twists>& unit,
+                          int first_coordinate, ForceDerivatives* out);
   void VaryCompensation(const BodyStates& states, const Twists& U, Twists* dw) const;
   void VaryElements(const BodyStates& states, const std::vector<int>& friction_signs,
                     const Twists& U, const Twists& dV, const Twists& dA, Twists* dw) const;

@@ -210,12 +210,12 @@ RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSamp
 }
 
 RunSummary ReducedModel::Derivatives(const MatX& T, const std::vector<LoadSample>& loads,
-                                     ForceDerivatives* out) {
+                                     ForceDerivatives* out, bool terms) {
   std::vector<int> signs;
   internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s, &signs);
   if (RunSummary summary = CheckFriction(signs); !summary.ok()) return summary;
   if (!impl_->variations) impl_->variations.emplace(impl_->mechanism);
-  return impl_->variations->Differentiate(&*impl_->closure, T, loads, signs, out);
+  return impl_->variations->Differentiate(&*impl_->closure, T, loads, signs, terms, out);
 }
 
 namespace {

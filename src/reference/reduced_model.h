@@ -31,7 +31,7 @@ struct ForceDerivatives {
   MatX by_position, by_velocity, by_acceleration;
   MatX drive_rates;                     ///< J_d: drives × n
   std::vector<MatX> drive_rate_slopes;  ///< ∂J_d/∂q_k
-  /// What ∂f/∂q and ∂f/∂v are sums of (reference/derivatives.h).
+  /// What ∂f/∂q and ∂f/∂v are sums of (reference/derivatives.h), where it was asked for.
   struct Term {
     const char* name;
     MatX by_position, by_velocity;
@@ -106,7 +106,7 @@ class ReducedModel {
   /// Derivatives of M a + h at the state that Move() reached. kUnsupported with dry friction at
   /// rest or by load, where there are none.
   [[nodiscard]] RunSummary Derivatives(const MatX& T, const std::vector<LoadSample>& loads,
-                                       ForceDerivatives* out);
+                                       ForceDerivatives* out, bool terms = false);
   /// J_d: drives × n.
   [[nodiscard]] MatX DriveRates(const MatX& T) const;
   /// Forces of drives and prescribed joints and all reactions, in sample(); as the reference, the

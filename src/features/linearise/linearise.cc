@@ -221,7 +221,7 @@ class Lineariser {
 
   bool Differentiate() {
     out_.control = model_->sample().control;
-    RunSummary summary = model_->Derivatives(T_, {}, &out_.by_reference);
+    RunSummary summary = model_->Derivatives(T_, {}, &out_.by_reference, true);
     if (!summary.ok()) return Refuse(summary);
     // Commands that hold the state, with the joints that are held.
     Motion motion;
@@ -434,6 +434,7 @@ class Lineariser {
       if (!v_.isZero(0.0)) engine.why_not = "the state is in motion";
       if (stiffness_.size() > 0) engine.why_not = "drives hold their place";
       if (!moved.ok()) engine.why_not = moved.message;
+      if (out_.A.bottomLeftCorner(n_, n_).isZero(0.0)) engine.why_not = "∂a/∂q vanishes";
       if (engine.why_not.empty()) {
         const EngineDerivatives by =
             DifferentiateEngine(mechanism_, model_->states().X_WB, T, out_.drive_force, soft);

@@ -84,6 +84,23 @@ TEST(ExactModel, SlopesAreTheRatesOfTheSameEquations) {
   }
 }
 
+// Of bushings, which may be turned by more than a right angle; values and rates along the angle.
+TEST(ExactModel, TurnsOfBushingsBelowHalfATurn) {
+  for (const double angle : {0.1, 0.25, 0.26, 1.0, 1.57, 1.58, 2.0, 2.89, 2.9, 3.1}) {
+    const double s = std::sin(angle), c = std::cos(angle);
+    const Series<T> turn(T(angle), T(1), T(0));
+    const Series<T> sine = Chain(turn, sin(turn.v), cos(turn.v), T(-sin(turn.v)));
+    const Series<T> cosine = Chain(turn, cos(turn.v), T(-sin(turn.v)), T(-cos(turn.v)));
+    const Series<T> f = AngleOverSine(sine * sine, cosine);
+    const double rate = (s - angle * c) / (s * s);
+    const double second = angle / s + 2.0 * c * (angle * c - s) / (s * s * s);
+    EXPECT_NEAR(Low(f.v), angle / s, 1e-14 * angle / s) << angle;
+    EXPECT_NEAR(Low(f.r), rate, 1e-12 * std::abs(rate)) << angle;
+    EXPECT_NEAR(Low(f.a), second, 1e-10 * std::abs(second)) << angle;
+    EXPECT_LT(High(f.a) - Low(f.a), 1e-25 * std::abs(second) + 1e-28) << angle;
+  }
+}
+
 TEST(ExactModel, SlopesOfAllJointKinds) {
   LoadResult loaded = LoadModel(SourcePath(kAllKinds));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();

@@ -202,6 +202,37 @@ elements:
   EXPECT_LT(result.imbalance, 1e-9);
 }
 
+// Without loops MuJoCo has the same equations; loops are soft there.
+TEST(Linearise, ShowsWhatMujocosDerivativeIsOffBy) {
+  LinearSettings settings;
+  settings.mujoco = true;
+  const Linearisation open = Linearise(Text(R"(name: double_pendulum
+gravity: [0, 0, -9.81]
+bodies:
+  a: {mass: 2, com: [0, 0, -0.3], inertia: [0.06, 0.06, 0.001], frames: {end: {position: [0, 0, -0.6]}}}
+  b: {mass: 1, com: [0, 0.1, -0.2], inertia: [0.02, 0.02, 0.001]}
+joints:
+  ja: {kind: revolute, parent: world, child: a, axis: x}
+  jb: {kind: revolute, parent: a.end, child: b, axis: x}
+drives:
+  motor: {kind: joint, joint: ja}
+springs:
+  line: {from: world, to: b, stiffness: 30, damping: 0.5, free_length: 0.4}
+)"),
+                                       settings);
+  ASSERT_EQ(open.engines.size(), 2U) << open.diagnostics.Text();
+  for (const EngineDerivative& engine : open.engines) {
+    EXPECT_EQ(engine.why_not, "");
+    EXPECT_LT(engine.position_error, 1e-6);
+    EXPECT_LT(engine.velocity_error, 1e-5);
+  }
+  const Linearisation loop = Linearise(Model("four_bar"), settings);
+  ASSERT_EQ(loop.engines.size(), 2U) << loop.diagnostics.Text();
+  EXPECT_GT(loop.engines[0].position_error, 1e-3);
+  EXPECT_LT(loop.engines[1].position_error, 1e-3);
+  EXPECT_GT(loop.engines[1].position_error, 1e-7);
+}
+
 TEST(Linearise, RefusesWhatHasNoDerivative) {
   const Linearisation result = Linearise(Model("journal_crank"), LinearSettings());
   ASSERT_TRUE(result.diagnostics.has_errors());
