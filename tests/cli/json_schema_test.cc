@@ -27,6 +27,9 @@ struct Call {
 // when all is well; of those that write JSON then, too, a disagreement, no answer and bad input.
 constexpr Call kCalls[] = {
     {"run four_bar/turn_inverse --no-pictures --out OUT/x", 0},
+    {"run four_bar/turn_inverse machine_five_bar/draw bricard/fall --derivatives=3 --no-pictures "
+     "--no-report --out OUT/x",
+     0},
     {"run four_bar/turn_inverse machine_five_bar/draw bricard/fall --certify=3 --no-pictures "
      "--no-report --out OUT/x",
      0},

@@ -34,6 +34,44 @@ constexpr double kBalanced = 1e-12;   // of the largest force
 constexpr double kLeastShare = 1e-6;  // of weights: a scale where no force is
 constexpr double kFirstStep = 0.01;   // of differences, in units of lengths and angles
 
+}  // namespace
+
+double DerivativeScales::Largest(const MatX& x, const VecX& unit) {
+  return x.size() == 0 ? 0.0 : x.cwiseProduct(unit * unit.transpose()).cwiseAbs().maxCoeff();
+}
+
+DerivativeScales::DerivativeScales(const Mechanism& mechanism, const VecX& unit,
+                                   const ForceDerivatives& by, const VecX& force)
+    : unit_(unit), a_(Largest(by.by_acceleration, unit)) {
+  double weight = 0.0;
+  for (const Body& body : mechanism.bodies) weight += body.mass * mechanism.gravity_W.norm();
+  const double v = Largest(by.by_velocity, unit);
+  q_ = std::max({Largest(by.by_position, unit), a_ > 0.0 ? v * v / a_ : 0.0,
+                 force.cwiseProduct(unit).cwiseAbs().maxCoeff(),
+                 kLeastShare * std::max(weight * CharacteristicLength(mechanism), a_)});
+  v_ = std::max(v, std::sqrt(q_ * a_));
+}
+
+double DerivativeScales::Error(const ForceDerivatives& by, const MatX& q, const MatX& v,
+                               const MatX& a) const {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  double most = 0.0;
+  for (const auto& [x, y, scale] :
+       {std::tuple(&q, &by.by_position, q_), std::tuple(&v, &by.by_velocity, v_),
+        std::tuple(&a, &by.by_acceleration, a_)}) {
+    const double off = (*x - *y).allFinite() ? Largest(*x - *y, unit_) : kNone;
+    if (off > 0.0) most = std::max(most, scale > 0.0 ? off / scale : kNone);
+  }
+  return most;
+}
+
+double DualLimit(double control) {
+  const double open = kRounding / (control * control);
+  return kDualLimit + (std::isfinite(open) ? open : 0.0);
+}
+
+namespace {
+
 class Lineariser {
  public:
   Lineariser(const Mechanism& mechanism, const LinearSettings& settings)
@@ -281,41 +319,18 @@ class Lineariser {
     return model_->Forces(T, {});
   }
 
-  [[nodiscard]] double Largest(const MatX& x) const {
-    return x.cwiseProduct(unit_ * unit_.transpose()).cwiseAbs().maxCoeff();
-  }
+  [[nodiscard]] double Largest(const MatX& x) const { return DerivativeScales::Largest(x, unit_); }
 
-  // Errors relate to the largest entry of the matrix. One that vanishes is small beside what the
-  // others make of it in the time of their own, √(|f_a|/|f_q|) or |f_a|/|f_v|, and ∂f/∂q also
-  // beside the forces themselves and a share of the weights, or of what one unit per s² needs.
   void Compare() {
     const ForceDerivatives& by = out_.by_reference;
-    double weight = 0.0;
-    for (const Body& body : mechanism_.bodies) weight += body.mass * mechanism_.gravity_W.norm();
-    const double q = Largest(by.by_position), v = Largest(by.by_velocity),
-                 a = Largest(by.by_acceleration);
-    const double scale_q = std::max(
-        {q, a > 0.0 ? v * v / a : 0.0, Size(out_.by_dual_numbers.force).cwiseAbs().maxCoeff(),
-         kLeastShare * std::max(weight * CharacteristicLength(mechanism_), a)});
-    const double scale_v = std::max(v, std::sqrt(scale_q * a));
-    const auto worst = [&](const MatX& of_q, const MatX& of_v, const MatX& of_a) {
-      double most = 0.0;
-      for (const auto& [x, y, scale] : {std::tuple(&of_q, &by.by_position, scale_q),
-                                        std::tuple(&of_v, &by.by_velocity, scale_v),
-                                        std::tuple(&of_a, &by.by_acceleration, a)}) {
-        const double off = (*x - *y).allFinite() ? Largest(*x - *y) : kInfinity;
-        if (off > 0.0) most = std::max(most, scale > 0.0 ? off / scale : kInfinity);
-      }
-      return most;
-    };
     const ExactDerivatives& dual = out_.by_dual_numbers;
-    out_.dual_error = worst(dual.by_position, dual.by_velocity, dual.by_acceleration);
+    const DerivativeScales scales(mechanism_, unit_, by, dual.force);
+    out_.dual_error = scales.Error(by, dual.by_position, dual.by_velocity, dual.by_acceleration);
     const ForceDerivatives& differences = out_.by_differences;
-    out_.difference_error =
-        worst(differences.by_position, differences.by_velocity, differences.by_acceleration);
-    const double open = kRounding / (out_.control * out_.control);
-    out_.dual_limit = kDualLimit + open;
-    out_.difference_limit = kDifferenceLimit + open;
+    out_.difference_error = scales.Error(by, differences.by_position, differences.by_velocity,
+                                         differences.by_acceleration);
+    out_.dual_limit = DualLimit(out_.control);
+    out_.difference_limit = kDifferenceLimit - kDualLimit + out_.dual_limit;
   }
 
   void Assemble() {

@@ -24,6 +24,8 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/reduced_model.h"
+#include "report/report.h"
+#include "verify/prepare.h"
 
 namespace mbv {
 
@@ -93,8 +95,35 @@ struct Linearisation {
   [[nodiscard]] bool agrees() const;
 };
 
+/// What errors of derivatives relate to, lengths in characteristic lengths (`unit`, per
+/// coordinate): the largest entry of each matrix. One that vanishes is small beside what the others
+/// make of it in the time of their own, √(|f_a|/|f_q|) or |f_a|/|f_v|, and ∂f/∂q also beside the
+/// forces themselves and a share of the weights, or of what one unit per s² needs.
+class DerivativeScales {
+ public:
+  DerivativeScales(const Mechanism& mechanism, const VecX& unit, const ForceDerivatives& by,
+                   const VecX& force);
+  /// The largest of ∂f/∂q, ∂f/∂v, ∂f/∂a against `by`; infinite where one is not finite.
+  [[nodiscard]] double Error(const ForceDerivatives& by, const MatX& q, const MatX& v,
+                             const MatX& a) const;
+  [[nodiscard]] static double Largest(const MatX& x, const VecX& unit);
+
+ private:
+  const VecX unit_;
+  double q_ = 0.0, v_ = 0.0, a_ = 0.0;
+};
+/// Of dual numbers against implicit differentiation: 1e-10, and what rounding leaves open at this
+/// smallest singular value of loops and coordinates.
+[[nodiscard]] double DualLimit(double control);
+
 /// The result has findings where there is none.
 [[nodiscard]] Linearisation Linearise(const Mechanism& mechanism, const LinearSettings& settings);
+
+/// Along a judged run's motion, of the forces along its commands with the scenario's loads, at
+/// `samples` spread ones (0: all): both ways to the derivatives, in the run's parts. Where they
+/// differ an agreement is taken away.
+void AddDerivatives(const Prepared& prepared, size_t samples,
+                    const std::function<void(double)>& progress, Report* report);
 
 // Writers.
 

@@ -15,6 +15,7 @@
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "features/certify/certificate_report.h"
+#include "features/linearise/linearise.h"
 #include "features/run/default_setup.h"
 #include "features/run/run_scenario.h"
 #include "mechanism/channels.h"
@@ -65,7 +66,7 @@ namespace {
 struct RunArguments {
   std::vector<std::string> scenarios, set, data;
   RobotArguments robot;
-  std::string out = "out", mode, report_script, kept_audits, agreed, certify;
+  std::string out = "out", mode, report_script, kept_audits, agreed, certify, derivatives;
   JsonOption json;
   bool no_report = false, no_pictures = false, no_source_model = false, quiet = false,
        verbose = false;
@@ -112,13 +113,14 @@ nlohmann::ordered_json ResultJson(const std::string& file, const RunOutcome& out
           {"findings", FindingObjects(outcome.diagnostics)}};
 }
 
-// What --certify asks for; false (after a message) if it is not a number of samples.
-bool ReadCertify(const std::string& text, CertifyOptions* options) {
+// How many samples --certify or --derivatives asks for, 0: all; false (after a message) if that is
+// no number.
+bool ReadSamples(const char* option, const std::string& text, size_t* samples) {
   const bool digits = !text.empty() && text.size() < 7 &&
                       std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
-  options->samples = digits ? std::stoul(text) : 0;
-  if (text == "all" || options->samples > 0) return true;
-  Say(stderr, "error: --certify={}: a number of samples or 'all'\n  hint: --certify=20\n", text);
+  *samples = digits ? std::stoul(text) : 0;
+  if (text == "all" || *samples > 0) return true;
+  Say(stderr, "error: {0}={1}: a number of samples or 'all'\n  hint: {0}=20\n", option, text);
   return false;
 }
 
@@ -130,13 +132,21 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   options->script_link = arguments.report_script;
   options->kept_audits = arguments.kept_audits;
   options->data = arguments.data;
-  if (!arguments.certify.empty()) {
-    CertifyOptions certify;
-    if (!ReadCertify(arguments.certify, &certify)) return false;
-    options->after_judgement = [certify, options](const Prepared& prepared, Report* report) {
+  CertifyOptions certify;
+  size_t derivatives = 0;
+  const bool proves = !arguments.certify.empty(), differentiates = !arguments.derivatives.empty();
+  if (proves && !ReadSamples("--certify", arguments.certify, &certify.samples)) return false;
+  if (differentiates && !ReadSamples("--derivatives", arguments.derivatives, &derivatives)) {
+    return false;
+  }
+  if (proves || differentiates) {
+    options->after_judgement = [=](const Prepared& prepared, Report* report) {
       CertifyOptions followed = certify;
       followed.progress = StageOf(options->progress, "proof");
-      AddCertificate(prepared, followed, report);
+      if (proves) AddCertificate(prepared, followed, report);
+      if (differentiates) {
+        AddDerivatives(prepared, derivatives, StageOf(options->progress, "derivatives"), report);
+      }
     };
   }
   if (!ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options->scenario.set))
@@ -273,6 +283,9 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
       "--certify{10}", arguments->certify,
       "prove forces in interval arithmetic at 10 spread samples and where witnesses differ "
       "most; --certify=N: at N, --certify=all: at all samples");
+  run->add_flag("--derivatives{10}", arguments->derivatives,
+                "derivatives of forces two ways at 10 spread samples; --derivatives=N, "
+                "--derivatives=all");
   arguments->json.AddTo(run);
   run->add_flag("--sizing", arguments->sizing, "all figures of the motors that the model states");
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");

@@ -75,7 +75,7 @@ TEST(ExactDerivatives, DifferWhereMassesDo) {
     if (mechanism.name != "stewart" && mechanism.name != "scara_robot") continue;
     VecX unit;
     const BothWays truth = Differentiate(mechanism, 3, &unit);
-    mechanism.bodies.back().mass *= 1.0 + 1e-8;
+    for (Body& body : mechanism.bodies) body.mass *= 1.0 + 1e-8;
     const BothWays off = Differentiate(mechanism, 3, &unit);
     EXPECT_GT(Apart(off.dual.by_position, truth.implicit.by_position, unit), 1e-11);
     EXPECT_GT(Apart(off.implicit.by_position, truth.dual.by_position, unit), 1e-11);
