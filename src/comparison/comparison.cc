@@ -146,6 +146,20 @@ const KnownFactor* FindFactor(double factor) {
   return nullptr;
 }
 
+std::string CountText(const Comparison& comparison) {
+  const size_t failed = comparison.failed(), followed = comparison.followed();
+  const size_t insensitive = comparison.insensitive();
+  const size_t all = failed + comparison.verified() + followed + insensitive;
+  if (failed > 0) return fmt::format("{} of {} checks exceed their limits", failed, all);
+  std::string text = fmt::format("all {} checks are within their limits", all);
+  if (followed > 0) {
+    text += fmt::format(", but {} of them compare{} a drive motion with itself and verif{} nothing",
+                        followed, followed == 1 ? "s" : "", followed == 1 ? "ies" : "y");
+  }
+  if (insensitive > 0) text += fmt::format("; {} more verify nothing", insensitive);
+  return text;
+}
+
 // Pairs and single witnesses → checks, verdict.
 
 namespace {
@@ -322,20 +336,6 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
     table.diagnoses = DiagnoseTable(input, *other->trace, pair->columns);
     return;
   }
-}
-
-std::string CountText(const Comparison& comparison) {
-  const size_t failed = comparison.failed(), followed = comparison.followed();
-  const size_t insensitive = comparison.insensitive();
-  const size_t all = failed + comparison.verified() + followed + insensitive;
-  if (failed > 0) return fmt::format("{} of {} checks exceed their limits", failed, all);
-  std::string text = fmt::format("all {} checks are within their limits", all);
-  if (followed > 0) {
-    text += fmt::format(", but {} of them compare{} a drive motion with itself and verif{} nothing",
-                        followed, followed == 1 ? "s" : "", followed == 1 ? "ies" : "y");
-  }
-  if (insensitive > 0) text += fmt::format("; {} more verify nothing", insensitive);
-  return text;
 }
 
 // A witness without which the scenario wants no verdict, and that nothing was compared with.

@@ -301,6 +301,8 @@ struct Comparison {
 };
 
 [[nodiscard]] Comparison Compare(const ComparisonInput& given);
+/// "all 31 checks are within their limits".
+[[nodiscard]] std::string CountText(const Comparison& comparison);
 
 /// The parts of Compare(), for tests and for other uses (a second engine, history).
 [[nodiscard]] PairComparison ComparePair(const ComparisonInput& input, const Trace& measured,

@@ -47,6 +47,7 @@ struct ContactLoad {
   std::string contact = {};  ///< "" of all feet together
   std::string kind = {};     ///< "point", "line", "sole"; "" of all
   std::string witness = {};
+  std::string phase = {};                         ///< of a scenario with phases
   double most_normal = kNan, mean_normal = kNan;  ///< [N]
   std::vector<Eigen::Vector2d> outline = {};      ///< that was judged by
   std::vector<Eigen::Vector2d> pressure = {};     ///< (3) per sample that the foot is pushed at

@@ -230,14 +230,14 @@ double SixthDifference(const MatX& values, int column) {
 }
 
 // Phase by which the fastest command goes on between two samples.
-double LargestPhase(const Mechanism& mechanism, const Motion& motion, double h) {
+double LargestPhase(const Mechanism& mechanism, const Motion& motion, double from_s, double h) {
   constexpr int kBetween = 4, kMost = 20000;
   const int count = static_cast<int>(std::min<double>(kMost, kBetween * motion.duration_s / h));
   double largest = 0.0;
   for (const Command& command : motion.commands) {
     double rate2 = 0.0, acceleration2 = 0.0, fastest = 0.0;
     for (int i = 0; i <= count; ++i) {
-      const Jet jet = Evaluate(command.profile, h / kBetween * i);
+      const Jet jet = Evaluate(command.profile, from_s + h / kBetween * i);
       rate2 += jet.rate * jet.rate;
       acceleration2 += jet.acceleration * jet.acceleration;
       fastest = std::max(fastest, std::abs(jet.rate));
@@ -454,7 +454,8 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
                                        trace.time_s.size(), 2 * kReach + 1);
     return;
   }
-  if (LargestPhase(*input.mechanism, *input.motion, trace.time_s[1] - trace.time_s[0]) > kHidden) {
+  if (LargestPhase(*input.mechanism, *input.motion, trace.time_s[0],
+                   trace.time_s[1] - trace.time_s[0]) > kHidden) {
     out->derivatives_gap = "the samples are too far apart for a motion so fast";
     return;
   }
@@ -488,7 +489,8 @@ std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace
   if (trace.time_s.size() < 2) return "";
   if (trace.time_s.size() < 2 * kReach + 1) {
     const double h = trace.time_s[1] - trace.time_s[0];
-    if (LargestPhase(*input.mechanism, *input.motion, h) <= kTwelvePerOscillation) return "";
+    if (LargestPhase(*input.mechanism, *input.motion, trace.time_s[0], h) <= kTwelvePerOscillation)
+      return "";
     return "the samples are too far apart for a motion so fast";
   }
   WitnessMetrics metrics;

@@ -193,6 +193,7 @@ struct BreakFinder {
 std::vector<double> BreakTimes(const Profile& profile) {
   std::vector<double> times;
   for (const ProfileTerm& term : profile.terms) std::visit(BreakFinder{&times}, term);
+  for (double& time_s : times) time_s -= profile.from_s;
   std::sort(times.begin(), times.end());
   times.erase(std::unique(times.begin(), times.end()), times.end());
   return times;
@@ -203,7 +204,7 @@ Jet Evaluate(const ProfileTerm& term, double t_s) { return std::visit(Evaluator{
 Jet Evaluate(const Profile& profile, double t_s) {
   Jet sum;
   for (const ProfileTerm& term : profile.terms) {
-    const Jet jet = Evaluate(term, t_s);
+    const Jet jet = Evaluate(term, t_s + profile.from_s);
     sum.value += jet.value;
     sum.rate += jet.rate;
     sum.acceleration += jet.acceleration;

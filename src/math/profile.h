@@ -102,9 +102,10 @@ using ProfileTerm =
     std::variant<ConstantTerm, RampTerm, SineTerm, PolyStepTerm, Poly4567StepTerm, CycloidStepTerm,
                  BumpTerm, RampCruiseTerm, ModifiedSineTerm, FourierTerm, PiecewiseTerm>;
 
-/// The sum of its terms.
+/// The sum of its terms, which are functions of t + from_s.
 struct Profile {
   std::vector<ProfileTerm> terms;
+  double from_s = 0.0;  ///< where on the terms' own time axis t = 0 is [s]
 };
 
 [[nodiscard]] Jet Evaluate(const ProfileTerm& term, double t_s);
@@ -117,7 +118,7 @@ struct Profile {
 /// integrator should step onto them.
 [[nodiscard]] std::vector<double> BreakTimes(const Profile& profile);
 
-[[nodiscard]] inline Profile Constant(double value) { return {{ConstantTerm{value}}}; }
+[[nodiscard]] inline Profile Constant(double value) { return {.terms = {ConstantTerm{value}}}; }
 
 // Laws of motion made of polynomials: point to point within limits, and through given points.
 

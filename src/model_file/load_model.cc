@@ -739,6 +739,10 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
   if (s.beams.good) internal::CheckBeams(*mechanism, &report);
   // With a broken joint, findings about the graph would only be its consequences; with a broken
   // number, those about the loops.
+  for (Joint& joint : mechanism->joints) {
+    const auto& guesses = reading->options.guesses;
+    if (const auto at = guesses.find(joint.name); at != guesses.end()) joint.guess = at->second;
+  }
   if (!s.joints.good || !internal::CheckTree(s.joints.hints, mechanism, &report)) return;
   if (report.has_errors()) return;
   const double by_option_m = reading->options.closure_tolerance_m;

@@ -1,6 +1,7 @@
 // model.yaml (and URDF) → Mechanism.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -44,6 +45,8 @@ struct LoadOptions {
   std::vector<std::string> plants = {};
   /// Names of the contacts that hold; empty: all of them.
   std::optional<std::vector<std::string>> holding = {};
+  /// Joint coordinates from which the home pose is solved, by joint, instead of the file's guesses.
+  std::map<std::string, std::array<double, 6>> guesses = {};
 };
 
 /// Whether a file is a robot of a foreign format (.urdf, .xml, .sdf), by its name, or

@@ -285,6 +285,7 @@ class PageWriter {
     page_.Add(DriveSection(report_));
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     page_.Add("Motors", "Motors", SizingHtml(report_));
+    page_.Add(PhaseSection(report_));
     page_.Add(ContactSection(report_));
     page_.Add(SingularitySection(report_, false));
     page_.Add(EngineSection(report_));

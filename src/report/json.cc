@@ -258,6 +258,7 @@ std::string ToJson(const Report& report) {
   }
   json["loads"] = LoadsJson(report);
   if (!report.motors.empty()) json["motors"] = SizingJson(report);
+  if (!report.phases.empty()) json["phases"] = PhasesJson(report);
   if (!report.contact_loads.empty()) json["contacts"] = ContactsJson(report);
   if (!report.singular.of.empty()) json["singularity"] = SingularityJson(report);
   json["findings"] = FindingsJson(report.findings);

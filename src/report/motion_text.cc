@@ -31,6 +31,7 @@ class VerdictTableWriter {
     out_.Add(ReferenceTableSection(report, out_.verbose()));
     out_.Add(MotionTableSection(report, out_.verbose()));
     AddLines(SizingLines(report, out_.sizing() || out_.verbose()));
+    out_.Add(PhaseSection(report));
     out_.Add(ContactSection(report));
     out_.Add(SingularitySection(report, out_.verbose()));
     out_.Add(DriveSection(report));

@@ -76,6 +76,18 @@ struct SmoothedForce {
   double change_rms = kNan, change_max = kNan;  ///< against the motion through all rows
 };
 
+/// A part of the motion with the same feet on the ground. Rows of the joined traces at the instant
+/// between two phases are those of the phase that begins; both were judged there.
+struct PhaseLine {
+  std::string name = {};
+  double from_s = kNan, to_s = kNan;
+  std::vector<std::string> contacts = {};
+  Verdict verdict = Verdict::kNotRun;
+  std::string reason = {};
+  std::string worst_check = {};  ///< of those with a limit; "" without one
+  double worst_use = kNan;       ///< its value over its limit
+};
+
 /// What a product adds to a run.
 struct ReportPart {
   std::string key;  ///< in summary.json
@@ -109,9 +121,11 @@ struct Report : ResultFrame {
   std::optional<EngineComparison> engine_comparison;
   std::shared_ptr<const SourceModelAudit> source_model;  ///< of a robot's MJCF; null without one
   std::vector<ReportPart> parts = {};
-  std::vector<std::string> pictures;       ///< file names below snapshots/
-  SingularApproaches singular;             ///< of the motion
-  std::vector<ContactLoad> contact_loads;  ///< by witness that ran, then by contact, then all
+  std::vector<std::string> pictures;  ///< file names below snapshots/
+  SingularApproaches singular;        ///< of the motion
+  /// By phase, by witness that ran, then by contact, then all.
+  std::vector<ContactLoad> contact_loads;
+  std::vector<PhaseLine> phases = {};  ///< empty of a motion without
 };
 
 /// summary.json.

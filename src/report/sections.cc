@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/text.h"
 #include "plot/svg_plot.h"
 #include "report/page.h"
 #include "report/plot_points.h"
@@ -66,10 +67,15 @@ std::string HoldText(const ContactLoad& load) {
   return load.unique() ? text : text + " (one share of many)";
 }
 
+std::string NameInPhase(const ContactLoad& load) {
+  return load.phase.empty() ? load.name() : fmt::format("{}, {}", load.phase, load.name());
+}
+
 // Lengths in millimetres.
 std::string PressureSvg(const ContactLoad& load) {
-  LinePlot plot{
-      .title = load.name() + ": centre of pressure", .x_label = "x [mm]", .y_label = "y [mm]"};
+  LinePlot plot{.title = NameInPhase(load) + ": centre of pressure",
+                .x_label = "x [mm]",
+                .y_label = "y [mm]"};
   PlotLine outline{.label = "ground contact"};
   for (const Eigen::Vector2d& p : load.outline) {
     outline.points.emplace_back(1e3 * p.x(), 1e3 * p.y());
@@ -86,19 +92,48 @@ std::string PressureSvg(const ContactLoad& load) {
 
 }  // namespace
 
+ReportSection PhaseSection(const Report& report) {
+  ReportSection section{.title = "Phases", .link = "Phases"};
+  if (report.phases.empty()) return section;
+  Table table{.name = "phases",
+              .caption = "Phases",
+              .columns = {Text("phase"), Digits("from"), Digits("to"), Text("feet on the ground"),
+                          Text("verdict"), Text("worst check"), Digits("of its limit")}};
+  for (const PhaseLine& phase : report.phases) {
+    const Mark mark = phase.verdict == Verdict::kAgree ? Mark::kOk : Mark::kFail;
+    table.rows.push_back(
+        {phase.name, fmt::format("{:g} s", phase.from_s), fmt::format("{:g} s", phase.to_s),
+         phase.contacts.empty() ? "none" : Joined(phase.contacts, 6),
+         Cell(phase.verdict == Verdict::kAgree      ? "agree"
+              : phase.verdict == Verdict::kDisagree ? "disagree"
+                                                    : "not run",
+              mark),
+         phase.worst_check,
+         phase.worst_check.empty() ? "–" : fmt::format("{:.2g}", phase.worst_use)});
+  }
+  section.Add(std::move(table));
+  section.Note(
+      "Each phase is a mechanism of its own with its feet held, computed and judged from its first "
+      "to its last sample. Where two phases meet forces jump: both judge that instant, with their "
+      "own forces, and traces and plots show those of the phase that begins.",
+      On::kAll);
+  return section;
+}
+
 ReportSection ContactSection(const Report& report) {
   ReportSection section{.title = "Feet on the ground", .link = "Contacts"};
   const std::vector<const ContactLoad*> loads = MainContactLoads(report);
   if (loads.empty()) return section;
-  Table table{.name = "contacts",
-              .caption = "Feet on the ground, " + loads.front()->witness,
-              .columns = {Text("foot"), Text("kind"), Digits("normal force, least"), Digits("most"),
-                          Digits("friction needed"), Digits("centre of pressure inside by"),
-                          Spare(Digits("twist")), Text("")}};
+  Table table{
+      .name = "contacts",
+      .caption = "Feet on the ground, " + loads.front()->witness,
+      .columns = {Text(report.phases.empty() ? "foot" : "phase, foot"), Text("kind"),
+                  Digits("normal force, least"), Digits("most"), Digits("friction needed"),
+                  Digits("centre of pressure inside by"), Spare(Digits("twist")), Text("")}};
   for (const ContactLoad* load : loads) {
     const bool exceeded =
         std::ranges::any_of(load->uses, [](const ContactLoad::Use& use) { return use.exceeded(); });
-    table.rows.push_back({load->name(), load->kind, UseCell(*load, Limit::kLift),
+    table.rows.push_back({NameInPhase(*load), load->kind, UseCell(*load, Limit::kLift),
                           std::isnan(load->most_normal)
                               ? Cell("–")
                               : Cell(fmt::format("{:.4g} N", load->most_normal)),
@@ -109,7 +144,13 @@ ReportSection ContactSection(const Report& report) {
   section.Add(std::move(table));
   const bool shared =
       std::ranges::any_of(loads, [](const ContactLoad* load) { return !load->unique(); });
-  const bool together = loads.back()->contact.empty();
+  const auto feet = [&](const std::string& phase) {
+    return std::ranges::count(loads, phase, [](const ContactLoad* load) { return load->phase; });
+  };
+  const bool together =
+      std::ranges::any_of(loads, [](const ContactLoad* load) { return load->contact.empty(); });
+  const bool several =
+      std::ranges::any_of(loads, [&](const ContactLoad* load) { return feet(load->phase) > 1; });
   if (shared) {
     section.Note(
         fmt::format("Statics leaves open what the feet share of the forces: of all shares "
@@ -117,7 +158,7 @@ ReportSection ContactSection(const Report& report) {
                     together ? " What all feet bear together follows from the motion." : ""),
         On::kAll);
   }
-  if (loads.size() > 1 && !together) {
+  if (several && !together) {
     section.Note(
         "What all feet bear together is not judged: something else ties the robot to the ground, "
         "or they do not stand on one plane and some state no friction or size.",
@@ -149,14 +190,29 @@ Json ContactsJson(const Report& report) {
                         {"from_s", Number(use.from_s)},
                         {"samples", use.beyond}});
     }
-    contacts.push_back({{"contact", load.contact},
-                        {"kind", load.kind},
-                        {"witness", load.witness},
-                        {"most_normal_N", Number(load.most_normal)},
-                        {"mean_normal_N", Number(load.mean_normal)},
-                        {"limits", std::move(limits)}});
+    Json contact = {{"contact", load.contact}, {"kind", load.kind}, {"witness", load.witness}};
+    if (!load.phase.empty()) contact["phase"] = load.phase;
+    contact["most_normal_N"] = Number(load.most_normal);
+    contact["mean_normal_N"] = Number(load.mean_normal);
+    contact["limits"] = std::move(limits);
+    contacts.push_back(std::move(contact));
   }
   return contacts;
+}
+
+Json PhasesJson(const Report& report) {
+  Json phases = Json::array();
+  for (const PhaseLine& phase : report.phases) {
+    phases.push_back({{"name", phase.name},
+                      {"from_s", Number(phase.from_s)},
+                      {"to_s", Number(phase.to_s)},
+                      {"contacts", phase.contacts},
+                      {"verdict", ToText(phase.verdict)},
+                      {"reason", phase.reason},
+                      {"worst_check", phase.worst_check},
+                      {"worst_use", Number(phase.worst_use)}});
+  }
+  return phases;
 }
 
 namespace {

@@ -11,6 +11,11 @@
 
 namespace mbv {
 
+/// A row per phase; without blocks where the motion has none.
+[[nodiscard]] ReportSection PhaseSection(const Report& report);
+/// `phases` of summary.json.
+[[nodiscard]] nlohmann::ordered_json PhasesJson(const Report& report);
+
 /// A row per foot, by the witness that a reader looks at first; the path of the centre of pressure
 /// under each foot. Without blocks where nothing stands on the ground.
 [[nodiscard]] ReportSection ContactSection(const Report& report);

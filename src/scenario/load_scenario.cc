@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <numbers>
+#include <span>
 
 #include "base/files.h"
 #include "base/inputs.h"
@@ -38,7 +40,7 @@ constexpr double kMostTableSteps = 2e5;  // no smaller step is taken than that g
 const std::vector<std::string> kMotionScenarioKeys = {
     "kind",      "mechanism", "description", "parameters", "gravity",    "motion",
     "loads",     "forces",    "analytic",    "reference",  "simulation", "checks",
-    "snapshots", "expect",    "witnesses",   "figures",    "contacts"};
+    "snapshots", "expect",    "witnesses",   "figures",    "contacts",   "phases"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -91,7 +93,11 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     if (const YamlNode* gravity = map.Find("gravity")) {
       scenario_.gravity_W = values_.Vector(*gravity, "gravity");
     }
-    ReadHolding(map.Find("contacts"));
+    if (const YamlNode* phases = map.Find("phases")) {
+      if (!ReadPhase(*phases, map)) return;
+    } else {
+      ReadHolding(map.Find("contacts"), "contacts");
+    }
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     // Numbers from here on may be expressions of the model's parameters.
     scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
@@ -105,13 +111,17 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
     scenario_.figures = ReadFigures(&values_, map.Find("figures"));
     if (!mechanism_) return;
-    CheckHolding(map.Find("contacts"));
+    if (const YamlNode* phases = map.Find("phases")) {
+      for (const YamlNodePtr& phase : phases->items) CheckHolding(phase->Find("contacts"));
+    } else {
+      CheckHolding(map.Find("contacts"));
+    }
     UsePlainNames();
     const MotionTimes times = ReadTable(map.Find("reference"));
     const YamlNode* motion = map.Required("motion");
     if (motion == nullptr) return;
     scenario_.motion = ReadMotion(&values_, *mechanism_, motion, map.Find("loads"),
-                                  map.Find("forces"), times, &table_findings_);
+                                  map.Find("forces"), times, PhaseMotionOf(), &table_findings_);
     ResolveTables(*motion, map.Find("simulation"));
     FitStep(map.Find("simulation"));
     scenario_.snapshots =
@@ -119,6 +129,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     CheckParameterNames(map);
     if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
     if (!yaml_.has_errors()) CheckDriveMode(*motion, map.Find("simulation"));
+    if (!yaml_.has_errors() && scenario_.phase) TakePhase(*map.Find("phases"));
   }
 
   // The file of equations lies beside the scenario, or beside the model.
@@ -144,14 +155,174 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
   }
 
   // Feet that stand on the ground in this scenario.
-  void ReadHolding(const YamlNode* node) {
+  void ReadHolding(const YamlNode* node, const std::string& path) {
     if (node == nullptr) return;
-    const auto items = yaml_.Items(*node, "contacts");
+    const auto items = yaml_.Items(*node, path);
     if (!items) return;
     scenario_.holding.emplace();
     for (size_t k = 0; k < items->size(); ++k) {
-      const auto name = yaml_.Text(*(*items)[k], fmt::format("contacts[{}]", k));
+      const auto name = yaml_.Text(*(*items)[k], fmt::format("{}[{}]", path, k));
       if (name) scenario_.holding->push_back(*name);
+    }
+  }
+
+  // The phase that is loaded; false where the rest of the file has no meaning without it.
+  bool ReadPhase(const YamlNode& node, const YamlMap& map) {
+    if (options_.phase == nullptr) {
+      yaml_.Error(node, "phases: each is a mechanism of its own, which this command does not join",
+                  "`mbverify run` and `mbverify regress` do; one phase alone is a scenario with "
+                  "contacts: […]");
+      return false;
+    }
+    const auto items = yaml_.Items(node, "phases");
+    if (!items) return false;
+    if (items->empty()) {
+      yaml_.Error(node, "phases is empty", "phases: [{until_s: 0.5, contacts: [left]}, …]");
+      return false;
+    }
+    for (const char* key : {"contacts", "forces"}) {
+      const YamlNode* other = map.Find(key);
+      if (other == nullptr) continue;
+      yaml_.Error(*other, fmt::format("{} and phases are not taken together", key),
+                  key == std::string("contacts") ? "each phase has contacts of its own" : "");
+    }
+    ScenarioPhase phase{
+        .index = options_.phase->index, .count = items->size(), .start = options_.phase->joints};
+    double from_s = 0.0;
+    std::vector<std::string> names;
+    for (size_t k = 0; k < items->size(); ++k) {
+      const std::string path = fmt::format("phases[{}]", k);
+      const YamlMap one(&yaml_, (*items)[k], path, {"name", "until_s", "contacts", "commands"});
+      if (!one.valid()) continue;
+      double to_s = kNan;  // the motion's end
+      if (k + 1 < items->size() || one.Has("until_s")) {
+        const YamlNode* until = one.Required("until_s");
+        to_s = until == nullptr ? kNan
+                                : values_.Positive(*until, one.PathOf("until_s")).value_or(kNan);
+        if (to_s <= from_s) {
+          yaml_.Error(*until, fmt::format("{} = {} violates until_s > {}, where it begins",
+                                          one.PathOf("until_s"), to_s, from_s));
+        }
+      }
+      const YamlNode* contacts = one.Required("contacts");
+      if (k == phase.index && contacts != nullptr) {
+        phase.from_s = from_s;
+        phase.to_s = to_s;
+        phase_commands_ = one.Find("commands");
+        ReadHolding(contacts, one.PathOf("contacts"));
+      }
+      std::string name = std::to_string(k + 1);
+      if (const YamlNode* given = one.Find("name")) {
+        name = yaml_.Text(*given, one.PathOf("name")).value_or(name);
+      }
+      if (Contains(names, name)) {
+        yaml_.Error(*(*items)[k], fmt::format("{}: there is a phase '{}' before", path, name));
+      }
+      names.push_back(name);
+      if (k == phase.index) phase.name = name;
+      from_s = to_s;
+    }
+    scenario_.phase = std::move(phase);
+    return !yaml_.has_errors();
+  }
+
+  [[nodiscard]] PhaseMotion PhaseMotionOf() const {
+    if (!scenario_.phase) return {};
+    return {.commands = phase_commands_,
+            .path = fmt::format("phases[{}].commands", scenario_.phase->index),
+            .first = options_.phase->first};
+  }
+
+  // Places that the model states for feet moved the pose in which the phase begins: this is found
+  // where it is compared with the end of the one before.
+  [[nodiscard]] bool IsMoved(const std::map<std::string, std::array<double, 6>>& start) const {
+    constexpr double kSame = 1e-6;  // m, rad
+    return std::ranges::any_of(mechanism_->joints, [&](const Joint& joint) {
+      const auto at = start.find(joint.name);
+      for (size_t k = 0; k < joint.home.size() && at != start.end(); ++k) {
+        if (std::abs(joint.home[k] - at->second[k]) > kSame) return true;
+      }
+      return false;
+    });
+  }
+
+  // The part of the motion in which the phase is, from 0 on.
+  void TakePhase(const YamlNode& node) {
+    constexpr double kSame = 1e-9;       // of the motion's duration
+    constexpr double kSameValue = 1e-6;  // m, rad: what typed digits leave
+    ScenarioPhase& phase = *scenario_.phase;
+    Motion& motion = scenario_.motion;
+    const double end_s = motion.duration_s;
+    if (std::isnan(phase.to_s)) phase.to_s = end_s;
+    const YamlNode& item = *node.items[phase.index];
+    const std::string path = fmt::format("phases[{}]", phase.index);
+    if (phase.from_s >= end_s || phase.to_s > end_s * (1.0 + kSame) ||
+        (phase.last() && phase.to_s < end_s * (1.0 - kSame))) {
+      yaml_.Error(item,
+                  fmt::format("{}: from {:g} to {:g} s does not fit motion.duration_s = {:g}", path,
+                              phase.from_s, phase.to_s, end_s),
+                  "the phases last as long as the motion; until_s of the last one may be left out");
+      return;
+    }
+    for (const double t_s : {phase.from_s, phase.to_s}) {
+      const double samples = t_s / motion.sample_s;
+      if (std::abs(samples - std::round(samples)) <= 1e-6 * std::max(1.0, samples)) continue;
+      yaml_.Error(item,
+                  fmt::format("{}: {:g} s violates until_s = n · motion.sample_s = n · {:g}", path,
+                              t_s, motion.sample_s),
+                  "both phases have a sample at the instant between them");
+      return;
+    }
+    const SimulationSettings& simulation = scenario_.simulation;
+    if (scenario_.reference.table != nullptr || !PrescribesMotion(simulation.mode) ||
+        simulation.stock_too) {
+      yaml_.Error(item,
+                  "phases run along the commanded motion, with the reference itself and one "
+                  "engine: not with reference.csv, simulation.stock_too, simulation.mode: "
+                  "servo or force_driven");
+      return;
+    }
+    if (motion.free()) {
+      yaml_.Error(item,
+                  "phases: some degrees of freedom move by forces, and feet that land or "
+                  "lift by themselves are not computed",
+                  "command every degree of freedom, or run a phase alone");
+      return;
+    }
+    phase.end_s = end_s;
+    phase.contacts = scenario_.holding.value_or(std::vector<std::string>{});
+    motion.duration_s = phase.to_s - phase.from_s;
+    phase.in_scenario_time = motion;
+    const auto shift = [&](Profile* profile) { profile->from_s = phase.from_s; };
+    for (Command& command : motion.commands) shift(&command.profile);
+    for (auto& load : motion.loads) {
+      for (size_t c = 0; c < 3; ++c) shift(&load.force[c]), shift(&load.moment[c]);
+      for (auto& following : load.following) {
+        following.function.value = [value = following.function.value, from_s = phase.from_s](
+                                       double t_s, std::span<const double> inputs) {
+          return value(t_s + from_s, inputs);
+        };
+      }
+    }
+    if (phase.index == 0 || IsMoved(phase.start)) return;
+    // Where the phase before left everything, the commands must go on.
+    for (const Command& command : motion.commands) {
+      const double begins = Evaluate(command.profile, 0.0).value;
+      double is = 0.0;
+      bool length = true;
+      for (const Command::Term& term : command.terms) {
+        is += term.factor * HomeValue(*mechanism_, term.coordinate);
+        length = length && IsLength(*mechanism_, term.coordinate);
+      }
+      const double jump =
+          length ? begins - is : std::remainder(begins - is, 2.0 * std::numbers::pi);
+      if (std::abs(is) < 1e-12) is = 0.0;
+      if (std::abs(jump) <= kSameValue) continue;
+      yaml_.Error(item,
+                  fmt::format("{}: {} is commanded to {:.9g} {} at {:g} s, where the phase "
+                              "before leaves it at {:.9g}",
+                              path, command.name, begins, length ? "m" : "rad", phase.from_s, is),
+                  "commands must go on where the phase before ends");
     }
   }
 
@@ -441,6 +612,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     }
     return hint;
   }
+
+  const YamlNode* phase_commands_ = nullptr;  // of the phase that is loaded
 };
 
 // The value of a first line "# expect: {…}", or nothing.
@@ -458,6 +631,7 @@ LoadOptions ModelOptions(const Scenario& scenario, const Overrides& more) {
   options.override_places = scenario.parameter_places;
   options.gravity_W = scenario.gravity_W;
   options.holding = scenario.holding;
+  if (scenario.phase) options.guesses = scenario.phase->start;
   return options;
 }
 
@@ -673,7 +847,8 @@ LoadResult ScenarioMemory::Load(const std::string& model_file, const LoadOptions
   };
   const bool same = model_.mechanism && model_file_ == model_file &&
                     std::ranges::equal(options_.overrides, options.overrides, same_override) &&
-                    options_.gravity_W == options.gravity_W && options_.holding == options.holding;
+                    options_.gravity_W == options.gravity_W &&
+                    options_.holding == options.holding && options_.guesses == options.guesses;
   if (same) return model_;
   rank_.reset();
   const auto known = texts_.find(model_file);

@@ -1,6 +1,7 @@
 // Scenario file → Scenario, resolved against its mechanism.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -27,8 +28,18 @@ struct LoadOptions;  // model_file/load_model.h
 /// "simulation.step_s" = "0.002": replaces or adds a value of the file; the value is YAML text.
 using SetValue = std::pair<std::string, std::string>;
 
+/// Which phase of a scenario with `phases` is loaded, and from where.
+struct PhaseStart {
+  size_t index = 0;
+  /// As ScenarioPhase::start.
+  std::map<std::string, std::array<double, 6>> joints = {};
+  /// The mechanism of the first phase, whose home is meant by `home`; null: this is the first one.
+  const Mechanism* first = nullptr;
+};
+
 struct ScenarioOptions {
-  std::vector<SetValue> set;  ///< applied in order
+  std::vector<SetValue> set;          ///< applied in order
+  const PhaseStart* phase = nullptr;  ///< null: the scenario must have no phases
 };
 
 struct ScenarioResult {

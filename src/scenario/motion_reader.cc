@@ -399,10 +399,11 @@ constexpr double kMostSamples = 1e6;
 class MotionReader {
  public:
   MotionReader(ValueReader* values, const Mechanism& mechanism, const MotionTimes& otherwise,
-               Diagnostics* files)
+               const PhaseMotion& phase, Diagnostics* files)
       : values_(values),
         mechanism_(mechanism),
         otherwise_(otherwise),
+        phase_(phase),
         known_(NamedMotionCoordinates(mechanism)),
         tables_{.mechanism = &mechanism, .files = files} {}
 
@@ -410,7 +411,8 @@ class MotionReader {
     YamlMap map(&yaml(), node, "motion",
                 {"duration_s", "sample_s", "commands", "equal", "path", "pose_table", "initial",
                  "initial_rates"});
-    if (const YamlNode* commands = map.Find("commands")) ReadCommands(*commands);
+    if (const YamlNode* commands = map.Find("commands")) ReadCommands(*commands, "motion.commands");
+    if (phase_.commands != nullptr) ReadCommands(*phase_.commands, phase_.path);
     if (const YamlNode* equal = map.Find("equal")) ReadEqual(*equal);
     if (const YamlNode* pose = map.Find("pose_table")) ReadPoseTable(*pose);
     double path_end_s = kNan;
@@ -538,13 +540,25 @@ class MotionReader {
     motion_.commands.push_back(std::move(command));
   }
 
-  void ReadCommands(const YamlNode& node) {
-    for (const YamlEntry& entry : yaml().Entries(node, "motion.commands")) {
-      const std::string path = "motion.commands." + entry.key;
-      const auto coordinate = FindCoordinate(entry, "motion.commands");
+  // Of the scenario's first phase, whose joints are the same but for those of contacts.
+  [[nodiscard]] double Home(Coordinate coordinate) const {
+    if (phase_.first == nullptr) return HomeValue(mechanism_, coordinate);
+    if (coordinate.kind == Coordinate::Kind::kJoint) {
+      const int own = coordinate.index;
+      coordinate.index = phase_.first->FindJoint(mechanism_.joints[static_cast<size_t>(own)].name);
+      if (coordinate.index < 0)
+        return HomeValue(mechanism_, {coordinate.kind, own, coordinate.component});
+    }
+    return HomeValue(*phase_.first, coordinate);
+  }
+
+  void ReadCommands(const YamlNode& node, const std::string& section) {
+    for (const YamlEntry& entry : yaml().Entries(node, section)) {
+      const std::string path = section + "." + entry.key;
+      const auto coordinate = FindCoordinate(entry, section);
       if (!coordinate) continue;
       const ProfileContext context{.unit = CoordinateUnit(mechanism_, *coordinate),
-                                   .home = HomeValue(mechanism_, *coordinate),
+                                   .home = Home(*coordinate),
                                    .name = entry.key,
                                    .moves = true,
                                    .tables = &tables_};
@@ -783,6 +797,7 @@ class MotionReader {
   ValueReader* values_;
   const Mechanism& mechanism_;
   const MotionTimes otherwise_;
+  const PhaseMotion phase_;
   std::vector<NamedCoordinate> known_;
   ProfileTables tables_;
   Motion motion_;
@@ -793,8 +808,8 @@ class MotionReader {
 
 Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,
                   const YamlNode* loads, const YamlNode* forces, const MotionTimes& otherwise,
-                  Diagnostics* files) {
-  return MotionReader(values, mechanism, otherwise, files).Read(motion, loads, forces);
+                  const PhaseMotion& phase, Diagnostics* files) {
+  return MotionReader(values, mechanism, otherwise, phase, files).Read(motion, loads, forces);
 }
 
 }  // namespace mbv

@@ -125,6 +125,22 @@ struct Expectation {
   std::string mentions;  ///< must occur in the printed result
 };
 
+/// A part of a scenario in which the same feet stand on the ground: a mechanism of its own, whose
+/// home pose is where the part before ends.
+struct ScenarioPhase {
+  size_t index = 0, count = 1;
+  std::string name = {};                   ///< of the file, or its number from 1
+  double from_s = 0.0, to_s = 1.0;         ///< scenario time; that of Scenario::motion begins at 0
+  double end_s = 1.0;                      ///< of the last phase
+  std::vector<std::string> contacts = {};  ///< that hold
+  /// Scenario::motion with profiles that are functions of scenario time.
+  Motion in_scenario_time = {};
+  /// Coordinates of the joints at its beginning, by joint; empty: those of the model's home.
+  std::map<std::string, std::array<double, 6>> start = {};
+
+  [[nodiscard]] bool last() const { return index + 1 == count; }
+};
+
 struct Scenario {
   std::string file;  ///< as given
   std::string name;  ///< file name without its ending, "must_fail/x" below a model's folder
@@ -146,6 +162,7 @@ struct Scenario {
   Expectation expect;
   std::vector<FigureSpec> figures;                  ///< that its author composes
   std::optional<std::vector<std::string>> holding;  ///< contacts that hold; empty: all
+  std::optional<ScenarioPhase> phase;               ///< that this is, of a scenario with `phases`
 };
 
 /// The sum of two override sets; `over` wins.

@@ -44,12 +44,19 @@ struct MotionTimes {
   std::optional<double> duration_s, sample_s;
 };
 
+/// What a phase of the scenario adds to its motion.
+struct PhaseMotion {
+  const YamlNode* commands = nullptr;  ///< null: none
+  std::string path = {};               ///< of them: "phases[1].commands"
+  const Mechanism* first = nullptr;    ///< PhaseStart::first
+};
+
 /// Reads the sections against a mechanism, with the tables that profiles name. Findings go to the
 /// reader, those about tables' files to `files`; the motion is complete only if there was no error.
 [[nodiscard]] Motion ReadMotion(ValueReader* values, const Mechanism& mechanism,
                                 const YamlNode* motion, const YamlNode* loads,
                                 const YamlNode* forces, const MotionTimes& otherwise,
-                                Diagnostics* files);
+                                const PhaseMotion& phase, Diagnostics* files);
 
 // The sections of a scenario file that do not concern motion.
 

@@ -45,8 +45,8 @@ const DocumentKind& KindOf(const std::string& file) {
 
 std::optional<Mechanism> MotionMechanism(const std::string& file, const ScenarioOptions& options,
                                          Diagnostics* diagnostics) {
-  std::optional<Prepared> prepared = Prepare(file, options, diagnostics);
-  return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
+  std::vector<Prepared> phases = PreparePhases(file, options, diagnostics);
+  return phases.empty() ? std::nullopt : std::optional(std::move(phases.front().base));
 }
 
 bool IsMechanismJson(const std::string& file, const ScenarioHead& /*head*/) {
@@ -84,7 +84,7 @@ Diagnostics CheckModel(const std::string& file) {
 
 Diagnostics CheckScenario(const std::string& file) {
   Diagnostics diagnostics;
-  (void)Prepare(file, {}, &diagnostics, {.none = true});  // checking runs nothing
+  (void)PreparePhases(file, {}, &diagnostics, {.none = true});  // checking runs nothing
   return diagnostics;
 }
 

@@ -138,7 +138,9 @@ std::string SimulationLine(const Prepared& prepared) {
   line +=
       fmt::format(", {}, {:g} s sampled every {:g} ms",
                   scenario.motion.free() ? FreeMotionText(prepared.base, scenario.motion) : drives,
-                  scenario.motion.duration_s, 1e3 * scenario.motion.sample_s);
+                  scenario.phase ? scenario.phase->end_s : scenario.motion.duration_s,
+                  1e3 * scenario.motion.sample_s);
+  if (scenario.phase) line += fmt::format(", in {} phases", scenario.phase->count);
   if (simulation.extrapolate) {
     const Extrapolation& extrapolation = *simulation.extrapolate;
     line += fmt::format("; forces extrapolated in {} from {:g} and {:g} to {:g}",

@@ -246,6 +246,7 @@ MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives) {
     return {.trouble = std::move(trouble)};
   }
   MjcfOptions options;
+  options.friction = true;
   options.prescribed = drives == ModelDrives::kHeld;
   if (drives == ModelDrives::kServo) {
     HomeServos servos = TuneHomeServos(mechanism);

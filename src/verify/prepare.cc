@@ -1,13 +1,20 @@
 #include "verify/prepare.h"
 
 #include <fmt/format.h>
+#include <algorithm>
+#include <array>
+#include <map>
 
 #include "base/text.h"
 #include "equations/equations.h"
+#include "kinematics/home.h"
+#include "math/spatial.h"
 #include "mechanism/channels.h"
 #include "mechanism/followed_state.h"
+#include "mechanism/reach.h"
 #include "model_file/load_model.h"
 #include "plot/figure.h"
+#include "reference/reference.h"
 #include "verify/drive_by.h"
 
 namespace mbv {
@@ -239,6 +246,160 @@ std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics,
                prepared.scenario.file, diagnostics);
   if (diagnostics->has_errors()) return {};
   return prepared;
+}
+
+namespace {
+
+// Where a phase ends: poses, twists, and the coordinates of all joints with their turns.
+struct PhaseEnd {
+  bool reached = false;
+  BodyStates states;
+  double fastest =
+      0.0;  // of any body in the phase, rotations times the characteristic length [m/s]
+  std::map<std::string, std::array<double, 6>> joints;
+};
+
+double SpeedOf(const Vec6& V, double length_m) {
+  return std::max(length_m * V.head<3>().norm(), V.tail<3>().norm());
+}
+
+PhaseEnd EndOf(const Prepared& prepared) {
+  const Mechanism& mechanism = prepared.base;
+  const Motion& motion = prepared.scenario.motion;
+  const double length_m = CharacteristicLength(mechanism);
+  PhaseEnd end;
+  std::vector<std::array<double, 6>> coordinates;
+  for (const Joint& joint : mechanism.joints) coordinates.push_back(joint.home);
+  ReferenceSolver solver(mechanism, motion, {.explain_unreached = false});
+  CommandSample command;
+  ReferenceSample sample;
+  for (const double t_s : SampleTimes(motion.duration_s, motion.sample_s)) {
+    EvaluateMotion(motion, t_s, &command);
+    if (!solver.Kinematics(command, &sample).ok()) return end;
+    coordinates = JointCoordinatesAt(mechanism, sample.states.X_WB, coordinates);
+    for (const Vec6& V : sample.states.V_WB)
+      end.fastest = std::max(end.fastest, SpeedOf(V, length_m));
+  }
+  end.reached = true;
+  end.states = std::move(sample.states);
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    end.joints[mechanism.joints[j].name] = coordinates[j];
+  }
+  return end;
+}
+
+// A foot whose place on the ground is stated must be there.
+void CheckPlaces(const Prepared& next, const PhaseEnd& before, Diagnostics* diagnostics) {
+  const Mechanism& mechanism = next.base;
+  const double same_m = 1e-6 * CharacteristicLength(mechanism);  // and rad
+  for (const Contact& contact : mechanism.contacts) {
+    if (contact.joint < 0) continue;
+    const auto foot =
+        static_cast<size_t>(mechanism.joints[static_cast<size_t>(contact.joint)].child);
+    const Pose off = before.states.X_WB[foot].inverse() * mechanism.X_WB_home[foot];
+    const double away_m = off.translation().norm(), turned = LogRotation(off.linear()).norm();
+    if (std::max(away_m, turned) <= same_m) continue;
+    diagnostics->AddError(
+        next.scenario.file,
+        fmt::format("phase '{}': at {:g} s {} is {:.3g} m and {:.3g} rad from its place on the "
+                    "ground (contacts.{}.to)",
+                    next.scenario.phase->name, next.scenario.phase->from_s,
+                    mechanism.bodies[foot].name, away_m, turned, contact.name),
+        "move the foot there in the phase before, or leave `to` out: the foot then stands where it "
+        "lands");
+  }
+}
+
+// Velocities that jump where feet land or lift.
+void FindImpact(const PhaseEnd& before, Prepared* next) {
+  constexpr double kNothing = 1e-6;  // of the fastest body's speed
+  const Mechanism& mechanism = next->base;
+  const double length_m = CharacteristicLength(mechanism);
+  ReferenceSolver solver(mechanism, next->scenario.motion, {.explain_unreached = false});
+  CommandSample command;
+  ReferenceSample sample;
+  EvaluateMotion(next->scenario.motion, 0.0, &command);
+  if (!solver.Kinematics(command, &sample).ok()) return;
+  double most = kNothing * before.fastest;
+  std::string text;
+  for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
+    const Vec6 jump = sample.states.V_WB[b] - before.states.V_WB[b];
+    if (SpeedOf(jump, length_m) <= most) continue;
+    most = SpeedOf(jump, length_m);
+    text = fmt::format(
+        "at {:.6g} s, where phase '{}' begins, velocities jump, most that of {} by {:.3g} m/s and "
+        "{:.3g} rad/s: this impact is not computed",
+        next->scenario.phase->from_s, next->scenario.phase->name, mechanism.bodies[b].name,
+        jump.tail<3>().norm(), jump.head<3>().norm());
+  }
+  if (!text.empty()) next->left_out_at_start.push_back(std::move(text));
+}
+
+// A sole that lands at another angle than it stood at in an earlier phase.
+void FindTilts(const std::vector<Prepared>& before, Prepared* next) {
+  constexpr double kFlat = 1e-4;  // rad
+  const auto normal = [](const Mechanism& mechanism, const Contact& contact) -> Vec3 {
+    return mechanism.joints[static_cast<size_t>(contact.joint)].X_CM.linear().col(2);
+  };
+  for (size_t c = 0; c < next->base.contacts.size(); ++c) {
+    const Contact& contact = next->base.contacts[c];
+    if (contact.joint < 0 || contact.kind != Contact::Kind::kSole) continue;
+    for (const Prepared& earlier : before) {
+      const Contact& stood = earlier.base.contacts[c];
+      if (stood.joint < 0) continue;
+      const double tilt = normal(earlier.base, stood).cross(normal(next->base, contact)).norm();
+      if (tilt <= kFlat) break;
+      next->left_out_at_start.push_back(fmt::format(
+          "from {:.6g} s on {} stands tilted by {:.2g} rad against how it stood before: it is "
+          "judged as if it touched the ground all over",
+          next->scenario.phase->from_s, contact.name, tilt));
+      break;
+    }
+  }
+}
+
+// What was not found in a phase before.
+void AppendNew(const Diagnostics& found, Diagnostics* diagnostics) {
+  for (const Finding& finding : found.findings()) {
+    const bool known = std::ranges::any_of(diagnostics->findings(), [&](const Finding& other) {
+      return ToText(other) == ToText(finding);
+    });
+    if (!known) diagnostics->Add(finding);
+  }
+}
+
+}  // namespace
+
+std::vector<Prepared> PreparePhases(const std::string& file, const ScenarioOptions& options,
+                                    Diagnostics* diagnostics, const ProgramConsent& consent) {
+  std::vector<Prepared> phases;
+  const bool one = !ReadScenarioHead(file).HasKey("phases");
+  PhaseStart start;
+  PhaseEnd end;
+  for (size_t k = 0, count = 1; k < count; ++k) {
+    ScenarioOptions with = options;
+    start.index = k;
+    if (!one) with.phase = &start;
+    Diagnostics found;
+    std::optional<Prepared> prepared = Prepare(file, with, &found, consent);
+    AppendNew(found, diagnostics);
+    if (!prepared) return {};
+    if (k > 0) {
+      CheckPlaces(*prepared, end, diagnostics);
+      if (diagnostics->has_errors()) return {};
+      FindImpact(end, &*prepared);
+      FindTilts(phases, &*prepared);
+    }
+    phases.push_back(*std::move(prepared));
+    if (one) break;
+    count = phases.back().scenario.phase->count;
+    if (k + 1 == count) break;
+    end = EndOf(phases.back());
+    if (!end.reached) break;
+    phases.reserve(count);
+    start = {.joints = end.joints, .first = &phases.front().base};
+  }
+  return phases;
 }
 
 const Role& Prepared::driver() const {

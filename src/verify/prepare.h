@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "analytic/closed_form.h"
 #include "base/diagnostics.h"
@@ -42,6 +43,8 @@ struct Prepared {
   WitnessMechanisms mechanisms;
   ClosedFormChoice closed_form;
   ProgramConsent consent = {};  ///< with which the equations of a file run
+  /// Of a phase: what happens at its beginning and is in no computation. Sentences.
+  std::vector<std::string> left_out_at_start = {};
 
   /// The witness whose kinematics the simulation follows.
   [[nodiscard]] const Role& driver() const;
@@ -72,6 +75,14 @@ void AddFormFindings(const std::string& scenario_file, const Diagnostics& found,
 /// The same of a scenario that was loaded.
 [[nodiscard]] std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics,
                                               const ProgramConsent& consent = {});
+
+/// The phases of a scenario, each from where the reference's kinematics leaves the one before; a
+/// scenario without phases is one. Empty after bad input. Ends with a phase whose motion is not
+/// possible: running it says why.
+[[nodiscard]] std::vector<Prepared> PreparePhases(const std::string& file,
+                                                  const ScenarioOptions& options,
+                                                  Diagnostics* diagnostics,
+                                                  const ProgramConsent& consent = {});
 
 /// The mechanism as each witness sees it. Findings are bad input.
 [[nodiscard]] WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base,

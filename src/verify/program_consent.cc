@@ -179,7 +179,10 @@ ProgramList ProgramsOf(const std::string& file, const ScenarioOptions& options) 
   if (!head.is_scenario || !(head.names_programs || set)) {
     return {.scenario = file};
   }
-  const ScenarioResult loaded = LoadScenario(file, options);
+  const PhaseStart first;  // all phases have the same programs
+  ScenarioOptions with = options;
+  if (head.HasKey("phases")) with.phase = &first;
+  const ScenarioResult loaded = LoadScenario(file, with);
   return loaded.scenario ? ProgramsOf(*loaded.scenario) : ProgramList{.scenario = file};
 }
 

@@ -429,7 +429,7 @@ ComparisonInput InputOf(const Prepared& prepared) {
   const Scenario& scenario = prepared.scenario;
   const SimulationSettings& simulation = scenario.simulation;
   return {.mechanism = &prepared.base,
-          .motion = &scenario.motion,
+          .motion = scenario.phase ? &scenario.phase->in_scenario_time : &scenario.motion,
           .limits = scenario.checks,
           .simulation_limits = simulation.forward() ? LimitColumn::kForward : LimitColumn::kInverse,
           .start_window_s = scenario.start_window_s,
@@ -438,6 +438,21 @@ ComparisonInput InputOf(const Prepared& prepared) {
           .own_parameters = OwnParameters(scenario, prepared.base),
           .left_out = TextsOf(scenario.model_caveats, ModelCaveat::Kind::kLeftOut),
           .unchecked_coverage = prepared.closed_form.unchecked};
+}
+
+void InScenarioTime(const Scenario& scenario, RunSummary* summary, Trace* trace) {
+  if (!scenario.phase || scenario.phase->from_s == 0.0) return;
+  const double from_s = scenario.phase->from_s, sample_s = scenario.motion.sample_s;
+  // On the same grid as without phases.
+  const auto first = std::llround(from_s / sample_s);
+  for (double& time_s : trace->time_s) {
+    time_s = static_cast<double>(first + std::llround(time_s / sample_s)) * sample_s;
+  }
+  for (double& time_s : trace->breaks_s) time_s += from_s;
+  summary->time_s += from_s;
+  if (summary->states_time) {
+    summary->message += fmt::format(" (its times begin at {:g} s)", from_s);
+  }
 }
 
 SimulationOptions OptionsOf(const Scenario& scenario, const Mechanism& mechanism, Engine engine) {

@@ -170,7 +170,11 @@ class WitnessRunner {
   WitnessRuns runs_;
 };
 
-/// What is compared, except for the witnesses and what statics leaves open.
+/// What is compared, except for the witnesses and what statics leaves open; times are those of the
+/// scenario, also where it is a phase (InScenarioTime()).
 [[nodiscard]] ComparisonInput InputOf(const Prepared& prepared);
+
+/// Moves what a witness recorded of a phase, which begins at 0, to the scenario's time.
+void InScenarioTime(const Scenario& scenario, RunSummary* summary, Trace* trace);
 
 }  // namespace mbv

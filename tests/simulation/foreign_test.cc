@@ -891,6 +891,71 @@ TEST(ForeignMjcf, AChainThatIsTooDeepForMujocoIsNamedSo) {
 }
 
 // What is left out stays known in the model that is written.
+TEST(ForeignMjcf, WordsOfNewerVersionsAreTranslatedOrLeftOutWhereNoForceDependsOnThem) {
+  const Mechanism plain = ReadText(Arm()).model->mechanism;
+  const std::pair<const char*, const char*> cases[] = {
+      {"<option integrator='implicitfast'/>", "integrator 'implicitfast' is read as 'implicit'"},
+      {"<option cone='of_tomorrow'/>", "cone 'of_tomorrow' of <option> is unknown"}};
+  for (const auto& [head, finding] : cases) {
+    const Read read = ReadText(Arm({.head = head}));
+    ASSERT_TRUE(read.model) << read.diagnostics.Text();
+    EXPECT_NE(read.diagnostics.Text().find(finding), std::string::npos) << read.diagnostics.Text();
+    EXPECT_TRUE(Sources(read).empty());
+    EXPECT_EQ(read.model->mechanism.bodies.size(), plain.bodies.size());
+  }
+  const Read filter = ReadText(Arm({.tail = "<actuator><general joint='A' dyntype='filterexact' "
+                                            "dynprm='0.1'/></actuator>"}));
+  ASSERT_TRUE(filter.model) << filter.diagnostics.Text();
+  EXPECT_EQ(filter.model->mechanism.drives.size(), 1U);
+  // A joint of an unknown type is no matter of taste.
+  EXPECT_FALSE(ReadText(Arm({.joint = "type='of_tomorrow'"})).model);
+}
+
+// Three slides and a ball carry a robot as a free joint does: held, or let go as one.
+TEST(ForeignMjcf, ABaseOnThreeSlidesAndABallFloats) {
+  struct Base {
+    std::string place = "", slide = "", joint = "", tail = "";
+  };
+  const auto text = [](const Base& base) {
+    return fmt::format(
+        R"(<mujoco><compiler angle="radian"/><worldbody><body name="pelvis" pos="0 0 1" {}>)"
+        R"(<joint name="px" type="slide" axis="1 0 0" {}/><joint type="slide" axis="0 1 0"/>)"
+        R"(<joint type="slide" axis="0 0 1" ref="1"/><joint type="ball" {}/>)"
+        R"(<inertial pos="0 0 0" mass="10" diaginertia="0.1 0.1 0.1"/>)"
+        R"(<body name="leg"><joint name="hip" axis="0 1 0"/>)"
+        R"(<inertial pos="0 0 -0.2" mass="1" diaginertia="0.01 0.01 0.001"/></body>)"
+        R"(</body></worldbody>{}</mujoco>)",
+        base.place, base.slide, base.joint, base.tail);
+  };
+  const Read held = ReadText(text({}));
+  ASSERT_TRUE(held.model) << held.diagnostics.Text();
+  EXPECT_EQ(held.model->mechanism.joints.size(), 2U);
+  EXPECT_EQ(held.model->mechanism.joints[0].kind, JointKind::kFixed);
+  EXPECT_NE(held.diagnostics.Text().find("three slides and a ball of 'pelvis' are read as one"),
+            std::string::npos);
+  EXPECT_TRUE(Sources(held).contains("body/freejoint"));
+  const std::string key = "<keyframe><key qpos='0 0 {} 1 0 0 0 0.1'/></keyframe>";
+  EXPECT_EQ(
+      ReadText(text({.tail = fmt::format(fmt::runtime(key), 1)})).model->mechanism.joints.size(),
+      2U);
+  // What acts along one of them, or names it, keeps them.
+  const Base kept[] = {{.slide = "damping='1'"},
+                       {.slide = "armature='0.1'"},
+                       {.slide = "stiffness='1'"},
+                       {.slide = "frictionloss='1'"},
+                       {.slide = "limited='true' range='-1 1'"},
+                       {.joint = "damping='1'"},
+                       {.joint = "pos='0 0 0.1'"},
+                       {.tail = "<actuator><motor joint='px'/></actuator>"},
+                       {.place = "euler='0 0 1'", .tail = fmt::format(fmt::runtime(key), 1)}};
+  for (const Base& base : kept) {
+    const Read read = ReadText(text(base));
+    ASSERT_TRUE(read.model) << read.diagnostics.Text();
+    EXPECT_EQ(read.model->mechanism.joints.size(), 5U)
+        << base.place << base.slide << base.joint << base.tail;
+  }
+}
+
 TEST(ForeignMjcf, AModelFileSaysWhatItsSourceLeftOut) {
   const Read read = ReadText(Arm({.head = "<option density='1.2'/>"}));
   ASSERT_TRUE(read.model) << read.diagnostics.Text();

@@ -23,6 +23,7 @@
 #include "features/equation_audit/audit.h"
 #include "features/mjcf_audit/source_audit.h"
 #include "features/run/engine_errors.h"
+#include "features/run/join_phases.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility.h"
 #include "kinematics/singularity.h"
@@ -280,18 +281,29 @@ class ScenarioRun {
 
   RunOutcome Run() {
     const auto start = std::chrono::steady_clock::now();
-    prepared_ = Prepare(file_, options_.scenario, &outcome_.diagnostics, options_.programs);
-    if (!prepared_) return BadInput();
+    std::vector<Prepared> phases =
+        PreparePhases(file_, options_.scenario, &outcome_.diagnostics, options_.programs);
+    if (phases.empty()) return BadInput();
+    const bool in_phases = phases.front().scenario.phase.has_value();
+    if (in_phases && options_.after_judgement) {
+      outcome_.diagnostics.AddError(
+          file_, "phases: --certify proves forces of one mechanism, and each phase is another",
+          "prove those of one phase: a scenario with contacts: […]");
+      return BadInput();
+    }
+    prepared_ = std::move(phases.front());
     const ProgramList programs = ProgramsOf(scenario(), options_.programs.archived);
     if (!options_.programs.Allows(programs)) {
       outcome_.diagnostics.Add(Refusal(programs));
       return BadInput();
     }
     outcome_.figures = scenario().figures;
-    Describe();
-    RunWitnesses();
+    if (in_phases) {
+      RunPhases(&phases);
+    } else {
+      Compute();
+    }
     if (outcome_.diagnostics.has_errors()) return BadInput();
-    Judge();
     if (options_.after_judgement) options_.after_judgement(*prepared_, &report_);
     RunSourceModel();
     DrawPictures();
@@ -311,6 +323,36 @@ class ScenarioRun {
   RunOutcome BadInput() {
     outcome_.exit_code = 2;
     return std::move(outcome_);
+  }
+
+  // Runs and judges what is prepared.
+  void Compute() {
+    Describe();
+    RunWitnesses();
+    if (!outcome_.diagnostics.has_errors()) Judge();
+  }
+
+  // Each phase as a run of its own, then their one result.
+  void RunPhases(std::vector<Prepared>* phases) {
+    std::vector<PhaseRun> runs;
+    for (size_t k = 0; k < phases->size(); ++k) {
+      ScenarioRun part(file_, options_);
+      part.outcome_.diagnostics = outcome_.diagnostics;
+      part.prepared_ = std::move(k == 0 ? *prepared_ : (*phases)[k]);
+      part.Compute();
+      if (part.outcome_.diagnostics.has_errors()) {
+        outcome_.diagnostics = std::move(part.outcome_.diagnostics);
+        return;
+      }
+      if (part.runs_.simulation) phase_mjcf_.push_back(part.runs_.simulation->mjcf);
+      runs.push_back(
+          {*part.scenario().phase, std::move(part.report_), std::move(part.runs_.simulation)});
+      if (k == 0) prepared_ = std::move(part.prepared_);
+    }
+    report_ = JoinPhases(base(), &runs);
+    runs_.simulation = JoinSimulations(&runs);
+    // Pictures are of the whole.
+    prepared_->scenario.motion.duration_s = report_.duration_s;
   }
 
   void Describe() {
@@ -355,6 +397,12 @@ class ScenarioRun {
       if (run.engine != runner.judged_engine()) report_.timing.stock_s += run.summary.wall_s;
     }
     if (runs_.simulation) report_.simulated_not_unique = runs_.simulation->not_unique;
+    for (WitnessRecord& record : runs_.records) {
+      InScenarioTime(scenario(), &record.summary, &record.trace);
+    }
+    if (runs_.simulation) {
+      InScenarioTime(scenario(), &runs_.simulation->summary, &runs_.simulation->trace);
+    }
   }
 
   // What the simulation's error is measured by, where it ran: other engines, or wrong forces.
@@ -416,6 +464,9 @@ class ScenarioRun {
         base(), runs_.simulation ? runs_.simulation->X_WB : std::vector<std::vector<Pose>>());
     report_.reactions_not_unique = input.reactions_not_unique;
     report_.comparison = Compare(input);
+    for (const std::string& text : prepared_->left_out_at_start) {
+      report_.comparison.caveats.push_back({.kind = CaveatKind::kContact, .of = {}, .text = text});
+    }
     TrySmallerStep(input);
     NameWaivers();
     WarnGravity();
@@ -442,7 +493,11 @@ class ScenarioRun {
       if (record.trace.Find(Quantity::kForce, base().drives.front().name) < 0) continue;
       if (forces == nullptr || record.name == prepared_->driver()) forces = &record.trace;
     }
-    report_.singular = ApproachesOf(base(), motion, SampleTimes(motion.duration_s, motion.sample_s),
+    RunSummary unused;
+    Trace grid;
+    grid.time_s = SampleTimes(motion.duration_s, motion.sample_s);
+    InScenarioTime(scenario(), &unused, &grid);
+    report_.singular = ApproachesOf(base(), motion, grid.time_s,
                                     simulated ? runs_.simulation->X_WB : X_WB, forces);
     for (const std::string& text : SingularityWarnings(report_.singular)) AddWarning(text);
   }
@@ -469,9 +524,10 @@ class ScenarioRun {
         OptionsOf(scenario(), prepared_->mechanisms.simulated, Engine::kCorrected);
     options.step_s *= 0.25;
     if (scenario().motion.duration_s > kMostFineSteps * options.step_s) return;
-    const SimulatedWitness finer = runner.Simulate(options, "a quarter of the step");
+    SimulatedWitness finer = runner.Simulate(options, "a quarter of the step");
     report_.timing.simulation_s += finer.run.summary.wall_s;
     if (!finer.run.summary.ok()) return;
+    InScenarioTime(scenario(), &finer.run.summary, &finer.run.trace);
     for (Witness& witness : input.witnesses) {
       if (witness.name == role::kSimulated) witness.trace = &finer.run.trace;
     }
@@ -594,6 +650,9 @@ class ScenarioRun {
             WithKeys(simulation->mjcf,
                      SnapshotKeys(scenario(), prepared_->mechanisms.simulated, *simulation)));
     }
+    for (size_t k = 1; k < phase_mjcf_.size(); ++k) {
+      write(fmt::format("model_phase{}.xml", k + 1), phase_mjcf_[k]);
+    }
     for (const PictureFile& picture : pictures_) {
       write("snapshots/" + picture.name, picture.content);
     }
@@ -628,6 +687,7 @@ class ScenarioRun {
   WitnessRuns runs_;
   std::vector<EngineRun> other_engines_;  // with the judged one
   std::vector<PictureFile> pictures_;
+  std::vector<std::string> phase_mjcf_;  // as simulated, by phase
 };
 
 }  // namespace

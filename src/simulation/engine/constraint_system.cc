@@ -6,6 +6,7 @@
 
 #include "math/spatial.h"
 #include "mechanism/reach.h"
+#include "simulation/engine/element_forces.h"
 
 namespace mbv::simulation {
 namespace {
@@ -168,6 +169,7 @@ void ConstraintSystem::EvaluatePosition() {
   }
   CheckRows();
   if (!engine_.sparse) {
+    TurnFrictionRows();
     TakeJacobian();
     return;
   }
@@ -184,6 +186,19 @@ void ConstraintSystem::EvaluatePosition() {
     }
   }
   if (m->ntendon > 0) mj_tendon(m, d_);  // dense
+}
+
+// MuJoCo's rows of a ball are about its own axes. Those of friction about axes that are fixed in
+// another frame or body are written anew; their J̇q̇ is 0, too, as an axis turns at right angles to
+// the rate about it.
+void ConstraintSystem::TurnFrictionRows() {
+  const int nv = engine_.m->nv;
+  for (int row = 0; row < friction_rows(); ++row) {
+    const size_t e = engine_.frictions[static_cast<size_t>(row)].elements.front();
+    if (engine_.elements[e].turned < 0) continue;
+    Eigen::Map<VecX>(d_->efc_J + static_cast<Eigen::Index>(rows_ + row) * nv, nv) =
+        ElementGradient(*this, e);
+  }
 }
 
 void ConstraintSystem::TakeJacobian() {

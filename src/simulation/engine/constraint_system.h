@@ -168,6 +168,7 @@ class ConstraintSystem {
   [[nodiscard]] double CouplingBias(int coupling) const;
   void FindUnits();
   void FindPattern();
+  void TurnFrictionRows();
   void CheckRows() const;
 
   const EngineModel& engine_;

@@ -517,6 +517,106 @@ struct ForeignMjcf::Impl {
     if (!trouble.text.empty()) Add(Severity::kError, trouble.line, trouble.text, trouble.hint);
   }
 
+  // Words that MuJoCo 2.2 has another one for: `implicitfast` leaves terms out of the Jacobian of
+  // `implicit`, and `filterexact` integrates the same filter without error.
+  void TranslateWords() {
+    constexpr const char* kWords[][3] = {{"integrator", "implicitfast", "implicit"},
+                                         {"dyntype", "filterexact", "filter"}};
+    ForEach(root(), [&](XMLElement* e) {
+      for (const auto& [attribute, newer, instead] : kWords) {
+        const char* value = e->Attribute(attribute);
+        if (value == nullptr || std::string_view(value) != newer) continue;
+        e->SetAttribute(attribute, instead);
+        Add(Severity::kWarning, e->GetLineNum(),
+            fmt::format("{} '{}' is read as '{}': forces that a motion takes do not depend on it",
+                        attribute, newer, instead));
+      }
+    });
+  }
+
+  // Three slides along the axes and a ball under a body of the world move it as a free joint does.
+  // Where anything acts along one of them or names it they stay what they are.
+  void JoinFloatingBases() {
+    XMLElement* world = root()->FirstChildElement("worldbody");
+    for (; world != nullptr; world = world->NextSiblingElement("worldbody")) {
+      for (XMLElement* body = world->FirstChildElement("body"); body != nullptr;
+           body = body->NextSiblingElement("body")) {
+        if (!IsFloatingBase(body)) continue;
+        body->InsertAfterChild(body->FirstChildElement("joint"), document.NewElement("freejoint"));
+        while (XMLElement* joint = body->FirstChildElement("joint")) body->DeleteChild(joint);
+        const char* name = body->Attribute("name");
+        Add(Severity::kWarning, body->GetLineNum(),
+            fmt::format("three slides and a ball of {} are read as one free joint",
+                        name == nullptr ? "a body" : fmt::format("'{}'", name)));
+      }
+    }
+  }
+
+  bool IsFloatingBase(const XMLElement* body) {
+    constexpr const char* kTypes[] = {"slide", "slide", "slide", "ball"};
+    const bool keys = root()->FirstChildElement("keyframe") != nullptr;
+    const std::vector<double> place = NumbersOf(body->Attribute("pos"), {0.0, 0.0, 0.0});
+    if (keys) {  // whose numbers are then those of the free joint
+      for (const char* turn : {"quat", "axisangle", "euler", "xyaxes", "zaxis"}) {
+        if (body->Attribute(turn) != nullptr) return false;
+      }
+    }
+    size_t k = 0;
+    for (const XMLElement* joint = body->FirstChildElement("joint"); joint != nullptr;
+         joint = joint->NextSiblingElement("joint"), ++k) {
+      const char* type = Inherited(joint, "type");
+      if (k >= std::size(kTypes) || type == nullptr || std::string_view(type) != kTypes[k]) {
+        return false;
+      }
+      const char* limited = Inherited(joint, "limited");
+      const bool free = limited != nullptr && std::string_view(limited) == "false";
+      if (!free && (limited == nullptr || IsAuto(limited)) &&
+          Inherited(joint, "range") != nullptr) {
+        return false;
+      }
+      if (!free && limited != nullptr && !IsAuto(limited)) return false;
+      for (const char* acts :
+           {"stiffness", "damping", "armature", "frictionloss", "springdamper"}) {
+        for (const double x : NumbersOf(Inherited(joint, acts), {})) {
+          if (x != 0.0) return false;
+        }
+      }
+      if (IsNamed(joint)) return false;
+      const std::vector<double> zero = {0.0, 0.0, 0.0};
+      if (k < 3) {
+        std::vector<double> along = zero;
+        along[k] = 1.0;
+        if (NumbersOf(Inherited(joint, "axis"), {0.0, 0.0, 1.0}) != along) return false;
+        const std::vector<double> ref = NumbersOf(Inherited(joint, "ref"), {0.0});
+        if (keys && (place.size() != 3 || ref != std::vector{place[k]})) return false;
+      } else if (NumbersOf(Inherited(joint, "pos"), zero) != zero) {
+        return false;
+      }
+    }
+    return k == std::size(kTypes);
+  }
+
+  static std::vector<double> NumbersOf(const char* text, std::vector<double> otherwise) {
+    if (text == nullptr) return otherwise;
+    std::istringstream words(text);
+    std::vector<double> numbers;
+    for (double x = 0.0; words >> x;) numbers.push_back(x);
+    return numbers;
+  }
+
+  // Another element's attribute has its name.
+  bool IsNamed(const XMLElement* joint) {
+    const char* name = joint->Attribute("name");
+    bool named = false;
+    if (name == nullptr) return named;
+    ForEach(root(), [&](const XMLElement* e) {
+      for (const auto* a = e->FirstAttribute(); a != nullptr && e != joint; a = a->Next()) {
+        named = named || std::string_view(a->Value()) == name;
+      }
+    });
+    return named;
+  }
+
   // Since MuJoCo 3.3.6 springs and dampers are switched off apart.
   void SwitchOff() {
     bool springs = false, dampers = false;
@@ -663,6 +763,7 @@ struct ForeignMjcf::Impl {
   }
 
   bool DropWeightlessGeoms(const std::string& body);
+  bool DropWord(const std::string& word, const std::string& tag);
 
   void MakeFoldersAbsolute() {
     std::error_code error;
@@ -681,11 +782,13 @@ ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnost
   if (ok()) impl_->AttachModels();
   if (ok()) impl_->DropModelAssets();
   if (ok()) impl_->SwitchOff();
+  if (ok()) impl_->TranslateWords();
   if (ok()) impl_->WriteOutFrames();
   if (ok()) impl_->DropPictures();
   if (ok()) impl_->LookUpAll();  // what only serves pictures needs no word
   if (ok()) impl_->CarryThrough();
   if (ok()) impl_->LetRangesHold();
+  if (ok()) impl_->JoinFloatingBases();
   if (ok()) impl_->NameBodiesOfSites();
   if (ok()) impl_->MakeFoldersAbsolute();
 }
@@ -768,9 +871,9 @@ namespace {
 
 // What MuJoCo's compiler refuses.
 struct Refused {
-  enum class Kind { kOther, kWeightlessBody, kUnknownAttribute, kUnknownElement };
+  enum class Kind { kOther, kWeightlessBody, kUnknownAttribute, kUnknownElement, kUnknownWord };
   Kind kind = Kind::kOther;
-  std::string name = {};     // of the body or the attribute
+  std::string name = {};     // of the body or the attribute, or the word that is its value
   std::string element = {};  // with the unknown attribute, or unknown itself
 };
 
@@ -793,6 +896,9 @@ Refused ReadRefusal(const std::string& message) {
   if (!element) return {};
   if (auto attribute = TextBetween(message, "", "unrecognized attribute: '", "'")) {
     return {Refused::Kind::kUnknownAttribute, *std::move(attribute), *std::move(element)};
+  }
+  if (auto word = TextBetween(message, "", "invalid keyword: '", "'")) {
+    return {Refused::Kind::kUnknownWord, *std::move(word), *std::move(element)};
   }
   if (message.find("unrecognized element") == std::string::npos) return {};
   return {.kind = Refused::Kind::kUnknownElement, .element = *std::move(element)};
@@ -821,11 +927,36 @@ bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& body) {
   return true;
 }
 
+// A value that is newer than this compiler, of an attribute on which no force depends.
+bool ForeignMjcf::Impl::DropWord(const std::string& word, const std::string& tag) {
+  std::string of;
+  int line = 0;
+  ForEach(root(), [&](XMLElement* e) {
+    if (!IsTag(e, tag.c_str())) return;
+    std::string found;
+    for (const auto* a = e->FirstAttribute(); a != nullptr; a = a->Next()) {
+      const ForeignRow* row = FindForeignRow(ElementOf(e), a->Name());
+      const bool harmless = row != nullptr && row->fate == Fate::kNoForce;
+      if (harmless && std::string_view(a->Value()) == word) found = a->Name();
+    }
+    if (found.empty()) return;
+    if (of.empty()) line = e->GetLineNum();
+    of = found;
+    e->DeleteAttribute(found.c_str());
+  });
+  if (of.empty()) return false;
+  Add(Severity::kWarning, line,
+      fmt::format("{} '{}' of <{}> is unknown to MuJoCo 2.2 and left out; no force depends on it",
+                  of, word, tag));
+  return true;
+}
+
 bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
   const Refused refused = ReadRefusal(message);
   const std::string &name = refused.name, &tag = refused.element;
   if (refused.kind == Refused::Kind::kOther) return false;
   if (refused.kind == Refused::Kind::kWeightlessBody) return impl_->DropWeightlessGeoms(name);
+  if (refused.kind == Refused::Kind::kUnknownWord) return impl_->DropWord(name, tag);
   if (refused.kind == Refused::Kind::kUnknownAttribute) {
     int count = 0, line = 0;
     bool forceless = true;

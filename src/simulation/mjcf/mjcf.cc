@@ -131,6 +131,7 @@ class MjcfWriter {
     }
     if (forces.damping != 0.0) xml_.Set("damping", forces.damping);
     if (forces.armature != 0.0) xml_.Set("armature", forces.armature);
+    if (options_.friction && forces.friction != 0.0) xml_.Set("frictionloss", forces.friction);
   }
 
   // The joint's coordinates in MuJoCo's qpos, which follows the order of the file.
@@ -342,13 +343,14 @@ const char* DrivesText(const MjcfOptions& options) {
 }
 
 // Force elements that MuJoCo has no word for.
-std::string LackingText(const Mechanism& mechanism) {
+std::string LackingText(const Mechanism& mechanism, const MjcfOptions& options) {
   std::string names;
   for (const ForceElement& element : mechanism.elements) {
     const bool of_free =
         element.joint >= 0 && mechanism.joints[element.joint].kind == JointKind::kFree;
     if (IsPlanned(element) && (!of_free || mjcf::HasEqualForces(mechanism, element.joint)))
       continue;
+    if (options.friction && mjcf::IsPlainFriction(mechanism, element)) continue;
     names += fmt::format("   {}: {}\n", InComment(element.name),
                          InComment(Described(mechanism, element)));
   }
@@ -376,7 +378,7 @@ std::string HeadComment(const Mechanism& mechanism, const MjcfOptions& options) 
   } else {
     text += std::string("Two ways to use it:\n") + DrivesText(options);
   }
-  text += LackingText(mechanism);
+  text += LackingText(mechanism, options);
   text +=
       "To look only: pause, and load a key; other keys than \"home\" are poses at rest.\n"
       "Loops are closed by the equalities close:JOINT; sensors JOINT.gap say how well.\n";

@@ -29,7 +29,8 @@ struct MjcfOptions {
   bool prescribed = true;  ///< false: the equalities that prescribe drive motion are switched off
   std::vector<double> kp = {}, kv = {};  ///< servos: per drive, a position and a velocity actuator
   std::vector<double> motor_home = {};   ///< per drive: the motors' forces in the key "home"
-  bool statics = false;  ///< masses mean nothing: not for stepping in time, says the comment
+  bool friction = false;  ///< frictionloss, for other programs; our engine has friction of its own
+  bool statics = false;   ///< masses mean nothing: not for stepping in time, says the comment
 };
 
 /// The MJCF of a mechanism in its home pose: bodies along the spanning tree

@@ -353,7 +353,11 @@ PlannedForces SumOf(const Mechanism& mechanism, const Acts& acts) {
   PlannedForces sum;
   double force_at_zero = 0.0;
   for (const ForceElement& element : mechanism.elements) {
-    if (!acts(element) || !IsPlanned(element)) continue;
+    if (!acts(element)) continue;
+    if (IsPlainFriction(mechanism, element)) {
+      sum.friction += std::get<FrictionLaw>(element.law).coulomb;
+    }
+    if (!IsPlanned(element)) continue;
     if (const auto* damping = std::get_if<DampingLaw>(&element.law)) {
       sum.damping += damping->damping;
     } else if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
@@ -376,6 +380,14 @@ bool IsPlanned(const ForceElement& element) {
   }
   return std::holds_alternative<DampingLaw>(element.law) ||
          (std::holds_alternative<RotorLaw>(element.law) && element.drive < 0);
+}
+
+bool IsPlainFriction(const Mechanism& mechanism, const ForceElement& element) {
+  const auto* law = std::get_if<FrictionLaw>(&element.law);
+  if (law == nullptr || element.joint < 0 || element.bushing >= 0) return false;
+  const JointKind kind = mechanism.joints[static_cast<size_t>(element.joint)].kind;
+  const bool scalar = kind != JointKind::kFree && !IsOfBall(kind, element.coordinate);
+  return scalar && law->breakaway == law->coulomb && law->per_load() == 0.0;
 }
 
 PlannedForces ForcesOfJoint(const Mechanism& mechanism, int joint, int coordinate) {

@@ -94,6 +94,7 @@ struct PlannedCoupling {
 /// −stiffness (q − free) − damping q̇ − armature q̈.
 struct PlannedForces {
   double damping = 0.0, stiffness = 0.0, armature = 0.0;  ///< SI
+  double friction = 0.0;                                  ///< of those that IsPlainFriction()
   double free = 0.0;                                      ///< position of no spring force
 
   [[nodiscard]] bool any() const { return damping != 0.0 || stiffness != 0.0 || armature != 0.0; }
@@ -108,6 +109,11 @@ struct PlannedForces {
 /// True for what these contain: damping, linear springs, rotors of joints; nothing of a bushing and
 /// no rotor that its carrier turns.
 [[nodiscard]] bool IsPlanned(const ForceElement& element);
+
+/// Dry friction that MuJoCo's frictionloss means as well: of one amount, whatever moves and
+/// whatever the joint bears, along a hinge or slide. The engine computes friction itself; an export
+/// states it.
+[[nodiscard]] bool IsPlainFriction(const Mechanism& mechanism, const ForceElement& element);
 
 /// Name of the MuJoCo joint of a joint's coordinate.
 [[nodiscard]] std::string JointName(const Joint& joint, int coordinate);
