@@ -17,7 +17,7 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
     AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
     AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand, AddCodeCommand,
-    AddLineariseCommand;
+    AddLineariseCommand, AddSheetCommand;
 
 namespace {
 
@@ -55,6 +55,7 @@ constexpr std::array kCommands = {
     CommandRow{AddFiguresCommand, kPublish},
     CommandRow{AddTablesCommand, kPublish},
     CommandRow{AddPackageCommand, kPublish, true},
+    CommandRow{AddSheetCommand, kPublish},
     CommandRow{AddCompletionCommand, kShell},
     CommandRow{AddHelpCommand, kShell},
     CommandRow{AddManPageCommand},  // the build asks for it

@@ -186,6 +186,8 @@ void Canvas::Cells(double x, double y, double width, double height, int columns,
   cairo_restore(pen_->cairo);
 }
 
+void Canvas::NextPage() const { cairo_show_page(pen_->cairo); }
+
 void Canvas::Clipped(double x, double y, double width, double height,
                      const std::function<void()>& draw) const {
   cairo_save(pen_->cairo);

@@ -52,6 +52,8 @@ class Canvas {
   /// Cells of one colour each (red, green, blue; negative: none), first row on top.
   void Cells(double x, double y, double width, double height, int columns,
              const std::vector<Rgb>& cells) const;
+  /// A PDF goes on with another page.
+  void NextPage() const;
   /// What `draw` draws, inside a rectangle only.
   void Clipped(double x, double y, double width, double height,
                const std::function<void()>& draw) const;

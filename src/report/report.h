@@ -161,9 +161,4 @@ void WriteCsv(const Report& report, const std::function<void(std::string_view)>&
 [[nodiscard]] std::string CsvMetadata(const Report& report);
 inline constexpr const char* kCsvMetadataFile = "traces.csv-metadata.json";
 
-// inputs.json: which files a run read.
-
-/// {schema, inputs: [{file, fingerprint}]}.
-[[nodiscard]] std::string ToJson(const std::vector<InputFile>& inputs);
-
 }  // namespace mbv

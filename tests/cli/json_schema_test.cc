@@ -45,6 +45,8 @@ constexpr Call kCalls[] = {
     {"study four_bar/study_by_hand --out OUT/x", 0},
     {"study four_bar/study_validation --out OUT/x", 0},
     {"sensitivity four_bar/turn_inverse --parameter rho", 0},
+    {"sensitivity four_bar/static --no-search --out OUT/x", 0},
+    {"sheet four_bar/turn_inverse --out OUT/x", 0},
     {"crosscheck four_bar/turn", 0},
     {"crosscheck --newest four_bar/turn", 0},
     {"workspace spr_tripod --no-pictures --out OUT/x", 0},

@@ -50,7 +50,9 @@ const char* const kScenarios[] = {"andrews_squeezer/benchmark",
                                   "journal_crank/falls",
                                   "slotted_screw/turn_inverse",
                                   "machine_five_bar/draw_inverse",
-                                  "belt_block/stick_slip"};
+                                  "belt_block/stick_slip",
+                                  "pendulum/fall",
+                                  "flyball_governor/spin"};
 
 struct Case {
   Scenario scenario;

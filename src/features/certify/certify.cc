@@ -1281,6 +1281,7 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
   Certificate certificate;
   certificate.why_not = WhyNotServed(motion);
   if (!certificate.why_not.empty()) return certificate;
+  const exact::NumberPool pool;
   const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
   const std::set<size_t> chosen =
       ChosenSamples(times.size(), options.samples, WorstSample(mechanism, traces));

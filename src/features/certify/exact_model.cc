@@ -1,8 +1,56 @@
 #include "features/certify/exact_model.h"
 
+#include <array>
+#include <cstdlib>
+#include <new>
+
 #include "features/certify/exact_numbers.h"
 
 namespace mbv::exact {
+namespace {
+
+// Freed blocks by size, linked through their first bytes; numbers of 240 bits take 40.
+constexpr size_t kLargestKept = 64;
+thread_local std::array<void*, kLargestKept + 1> kept_blocks{};
+
+bool IsKept(size_t size) { return size >= sizeof(void*) && size <= kLargestKept; }
+void* NewBlock(size_t size) {
+  if (IsKept(size) && kept_blocks[size] != nullptr) {
+    return std::exchange(kept_blocks[size], *static_cast<void**>(kept_blocks[size]));
+  }
+  void* block = std::malloc(size);  // NOLINT: what GMP's other functions free
+  if (block == nullptr) throw std::bad_alloc();
+  return block;
+}
+void FreeBlock(void* block, size_t size) {
+  if (IsKept(size) && block != nullptr) {
+    *static_cast<void**>(block) = std::exchange(kept_blocks[size], block);
+  } else {
+    std::free(block);  // NOLINT
+  }
+}
+void* ResizedBlock(void* block, size_t /*size*/, size_t size) {
+  block = std::realloc(block, size);  // NOLINT
+  if (block == nullptr) throw std::bad_alloc();
+  return block;
+}
+
+}  // namespace
+
+NumberPool::NumberPool() {
+  mp_get_memory_functions(&allocate_, &reallocate_, &free_);
+  mp_set_memory_functions(NewBlock, ResizedBlock, FreeBlock);
+}
+
+NumberPool::~NumberPool() {
+  mp_set_memory_functions(allocate_, reallocate_, free_);
+  for (void*& first : kept_blocks) {
+    while (first != nullptr) {
+      std::free(std::exchange(first, *static_cast<void**>(first)));  // NOLINT
+    }
+  }
+}
+
 namespace {
 
 template <typename T>

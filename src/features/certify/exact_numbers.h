@@ -2,6 +2,7 @@
 // (MPFI, on MPFR), and dual numbers.
 #pragma once
 
+#include <gmp.h>
 #include <cmath>
 
 #include <boost/multiprecision/mpfi.hpp>
@@ -64,5 +65,20 @@ template <>
 inline Dual Symmetric<Dual>(double /*radius*/) {
   return {};
 }
+
+/// While it lives, GMP keeps freed blocks of numbers for the next ones of this thread: half of the
+/// time would go into the heap. Blocks are malloc's, and may outlive it.
+class NumberPool {
+ public:
+  NumberPool();
+  ~NumberPool();
+  NumberPool(const NumberPool&) = delete;
+  NumberPool& operator=(const NumberPool&) = delete;
+
+ private:
+  void* (*allocate_)(size_t) = nullptr;
+  void* (*reallocate_)(void*, size_t, size_t) = nullptr;
+  void (*free_)(void*, size_t) = nullptr;
+};
 
 }  // namespace mbv::exact

@@ -699,11 +699,13 @@ class FormulaMaker {
           evaluate();
           const MatX loops = A.bottomRows(m - commands);
           const VecX open = r.tail(m - commands);
-          Eigen::CompleteOrthogonalDecomposition<MatX> solver(loops);
-          solver.setThreshold(1e-9);
           VecX step = VecX::Zero(n);
           if (pass == 0) step = free;
-          if (loops.rows() > 0) step -= solver.solve(loops * step + open);
+          if (loops.rows() > 0) {  // Eigen decomposes nothing that is empty
+            Eigen::CompleteOrthogonalDecomposition<MatX> solver(loops);
+            solver.setThreshold(1e-9);
+            step -= solver.solve(loops * step + open);
+          }
           Step(scale.asDiagonal() * step, &x);
         }
         evaluate();  // q
@@ -712,10 +714,14 @@ class FormulaMaker {
       for (size_t k = 0; k < unknown.size(); ++k) {
         U.col(static_cast<Eigen::Index>(k)) = A.col(unknown[k]);
       }
-      Eigen::ColPivHouseholderQR<MatX> qr(U);
-      qr.setThreshold(1e-8);
-      if (qr.rank() < best_rank) continue;
-      best_rank = qr.rank();
+      Eigen::Index rank = 0;
+      if (U.size() > 0) {
+        Eigen::ColPivHouseholderQR<MatX> qr(U);
+        qr.setThreshold(1e-8);
+        rank = qr.rank();
+      }
+      if (rank < best_rank) continue;
+      best_rank = rank;
       best = U;
     }
     if (best_rank < static_cast<Eigen::Index>(unknown.size())) {

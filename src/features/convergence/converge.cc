@@ -26,6 +26,7 @@
 #include "verify/computed_once.h"
 #include "verify/drive_by.h"
 #include "verify/run_witnesses.h"
+#include "verify/version.h"
 
 namespace mbv {
 
@@ -443,10 +444,11 @@ struct ConvergeArguments {
 };
 
 // "" or what went wrong.
-std::string WriteFolder(const std::string& out, const ConvergenceReport& report) {
+std::string WriteFolder(const std::string& out, const ConvergenceReport& report,
+                        const std::string& inputs) {
   OutputFolder folder(out, report.mechanism + "/convergence/" + report.scenario);
-  std::vector<std::pair<std::string, std::string>> files = {{"converge.json", ToJson(report)},
-                                                            {"converge.csv", ToCsv(report)}};
+  std::vector<std::pair<std::string, std::string>> files = {
+      {"converge.json", ToJson(report)}, {"converge.csv", ToCsv(report)}, {"inputs.json", inputs}};
   for (auto& plot : ConvergencePlots(report)) files.push_back(std::move(plot));
   std::string trouble = folder.WriteAll(files);
   if (trouble.empty()) Say(stderr, "results in {}\n", folder.target().string());
@@ -467,6 +469,7 @@ int RunConverge(const ConvergeArguments& arguments) {
   }
   if (const int code = RefuseInput(arguments.json.path(), arguments.scenario); code != 0)
     return code;
+  const InputWatch inputs;
   const ConvergeOutcome outcome = Converge(FindScenario(arguments.scenario), options);
   progress.Clear();
   SayText(stderr, outcome.diagnostics.Text());
@@ -474,7 +477,9 @@ int RunConverge(const ConvergeArguments& arguments) {
   if (outcome.exit_code > 1) return outcome.exit_code;
   SayText(arguments.json.text(), ToText(outcome.report));
   std::fflush(stdout);
-  if (const std::string trouble = WriteFolder(arguments.out, outcome.report); !trouble.empty()) {
+  if (const std::string trouble = WriteFolder(arguments.out, outcome.report,
+                                              InputsJson(inputs.files(), options.scenario.set));
+      !trouble.empty()) {
     return NotWritten(trouble, "choose another folder with --out");
   }
   return WorseExit(outcome.exit_code, arguments.json.Write(ToJson(outcome.report), {}));

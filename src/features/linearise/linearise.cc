@@ -115,7 +115,7 @@ class Lineariser {
       for (const auto& [name, value] : *values) {
         const auto at = std::ranges::find(names, name);
         if (at == names.end()) {
-          return Refuse("'" + name + "' is none of the coordinates: " + Joined(names, 8),
+          return Refuse("'" + name + "' is not one of the coordinates: " + Joined(names, 8),
                         "choose it: --coordinates " + name + ",…");
         }
         (*into)[at - names.begin()] = value;
@@ -473,7 +473,7 @@ class Lineariser {
     return unit_.cwiseInverse().asDiagonal() * x * unit_.asDiagonal();
   }
 
-  // Somebody else's matrices.
+  // The user's matrices.
   void Check() {
     if (settings_.check.empty()) return;
     const auto refuse = [&](const std::string& message, const std::string& hint) {
@@ -489,7 +489,7 @@ class Lineariser {
     if (json.contains("coordinates")) {
       const std::vector<std::string> names = NamesOf(out_.coordinates);
       if (json["coordinates"] != nlohmann::json(names)) {
-        return refuse("coordinates are others than these: " + Joined(names, 12),
+        return refuse("coordinates are other than these: " + Joined(names, 12),
                       "the same in this order, or --coordinates");
       }
     }

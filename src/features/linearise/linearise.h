@@ -54,7 +54,7 @@ struct VibrationMode {
 };
 constexpr int kModeFrames = 24;
 
-/// How far a matrix of somebody else's is off.
+/// How far a matrix of the user's is off.
 struct DerivativeCheck {
   std::string matrix;     ///< "f_q", "f_v", "f_a", "A" or "B"
   double error = kNan;    ///< of its largest entry, in units of lengths and angles

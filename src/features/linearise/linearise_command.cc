@@ -91,7 +91,7 @@ void AddLineariseCommand(CLI::App* app, int* exit_code) {
   linearise->add_flag("--mujoco", settings.mujoco,
                       "MuJoCo's own derivative at rest (mjd_transitionFD) beside ours");
   linearise->add_option("--check", settings.check,
-                        "a JSON file with derivatives of your own to be judged: f_q, f_v, f_a, A, "
+                        "a JSON file with user-defined derivatives to be judged: f_q, f_v, f_a, A, "
                         "B");
   linearise->add_option("--check-limit", settings.check_limit, "of their largest entries")
       ->check(CLI::PositiveNumber)

@@ -138,16 +138,15 @@ std::string VerdictText(const Linearisation& result) {
     return fmt::format("DISAGREE: {} is off by {:.2g} of its largest entry{}", check.matrix,
                        check.error, check.explained.empty() ? "" : "; " + check.explained);
   }
-  return fmt::format("AGREE: derivatives of {} way{}", result.checks.empty() ? "three" : "four",
-                     "s");
+  return fmt::format("AGREE: derivatives computed {}",
+                     result.checks.empty() ? "three ways" : "three ways, and yours");
 }
 
 std::vector<ReportSection> SectionsOf(const Linearisation& result, const Mechanism* mechanism) {
   ReportSection modes{.title = "Natural frequencies and modes", .link = "Modes"};
   modes.Add(ModeTable(result));
   modes.Note(
-      "The largest coordinate of a mode counts 1 in its unit: radians, or characteristic "
-      "lengths.");
+      "The largest coordinate of a mode is 1 rad or one characteristic length; lengths are in m.");
   ReportSection state{.title = "The state", .link = "State"};
   state.Add(StateTable(result, mechanism));
   Table forces{.columns = {Text("drive"), Digits("force")}};

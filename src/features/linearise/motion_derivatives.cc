@@ -65,7 +65,7 @@ SampleDerivatives Differentiate(const Mechanism& mechanism, const Motion& motion
 }
 
 SampledDerivatives Compute(const Mechanism& mechanism, const Motion& motion, size_t count,
-                          const std::function<void(double)>& progress) {
+                           const std::function<void(double)>& progress) {
   SampledDerivatives result;
   if (motion.free()) {
     result.why_not = "a free motion: forces are given, and motions are integrated";

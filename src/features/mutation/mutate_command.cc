@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "base/files.h"
+#include "base/json_text.h"
+#include "base/output_folder.h"
 #include "base/scratch_folder.h"
 #include "base/text.h"
 #include "base/worker_pool.h"
@@ -22,6 +24,8 @@
 #include "features/mutation/mutate.h"
 #include "features/regress/find_cases.h"
 #include "scenario/find_model.h"
+#include "scenario/load_scenario.h"
+#include "verify/version.h"
 
 namespace mbv {
 namespace {
@@ -34,7 +38,7 @@ struct MutateArguments {
   double resolution_percent = 10.0;
   std::vector<std::string> numbers;
   bool markdown = false, no_search = false, no_faults = false;
-  std::string mode = "both", part, progress;
+  std::string mode = "both", part, progress, out;
   JsonOption json;
   int jobs = 1;
 };
@@ -199,6 +203,20 @@ MutationReport RunHere(const MutateArguments& arguments, MutationOptions options
   return MutateScenario(arguments.scenario, options);
 }
 
+// "" or what went wrong. Workers read the files; what they read is read once more here.
+std::string WriteFolder(const MutateArguments& arguments, const MutationReport& report) {
+  const InputWatch inputs;
+  const ScenarioResult loaded = LoadScenario(arguments.scenario);
+  if (!loaded.scenario) return "";
+  OutputFolder folder(arguments.out,
+                      loaded.mechanism->name + "/sensitivity/" + loaded.scenario->name);
+  std::string trouble = folder.WriteAll(
+      {{"sensitivity.json", arguments.json.Text(ParseJson<nlohmann::ordered_json>(ToJson(report)))},
+       {"inputs.json", InputsJson(inputs.files())}});
+  if (trouble.empty()) Say(stderr, "results in {}\n", folder.target().string());
+  return trouble;
+}
+
 int Mutate(MutateArguments arguments) {
   arguments.scenario = FindScenario(arguments.scenario);
   const auto options = OptionsOf(arguments);
@@ -224,7 +242,10 @@ int Mutate(MutateArguments arguments) {
   } else {
     SayText(arguments.json.text(), text);
   }
-  return report.exit_code;
+  if (arguments.out.empty()) return report.exit_code;
+  const std::string trouble = WriteFolder(arguments, report);
+  return trouble.empty() ? report.exit_code
+                         : NotWritten(trouble, "choose another folder with --out");
 }
 
 }  // namespace
@@ -239,11 +260,13 @@ void AddSensitivityCommand(CLI::App* app, int* exit_code) {
   mutate->add_option("scenario", arguments->scenario, "scenario file that agrees")->required();
   mutate->add_option("--size", arguments->size, "relative error in percent (1%)")
       ->capture_default_str();
-  mutate
-      ->add_option("--parameter", arguments->numbers,
-                   "only these numbers: a parameter, limb2.azimuth of an instance, or the place of "
-                   "a number such as bodies.rod.mass (repeatable)")
-      ->allow_extra_args(false);
+  CLI::Option* only =
+      mutate
+          ->add_option(
+              "--parameter", arguments->numbers,
+              "only these numbers: a parameter, limb2.azimuth of an instance, or the place of "
+              "a number such as bodies.rod.mass (repeatable)")
+          ->allow_extra_args(false);
   mutate
       ->add_option("--resolution", arguments->resolution_percent,
                    "of the smallest detectable error, in percent")
@@ -263,6 +286,10 @@ void AddSensitivityCommand(CLI::App* app, int* exit_code) {
   mutate->add_option("--part", arguments->part, "i/n: a worker's share")->group("");
   mutate->add_option("--progress", arguments->progress, "file for a worker's progress")->group("");
   mutate->add_flag("--markdown", arguments->markdown, "print Markdown tables");
+  mutate
+      ->add_option("--out", arguments->out,
+                   "folder that keeps the result, for mbverify sheet; of all numbers only")
+      ->excludes(only);
   arguments->json.AddTo(mutate);
   SetFooter(
       mutate,

@@ -267,6 +267,10 @@ std::string ToJson(const RerunReport& report, int exit_code) {
     json["other_versions"].push_back(
         {{"name", other.name}, {"packed", other.packed}, {"here", other.here}});
   }
+  json["inputs"] = Json::array();
+  for (const PackedFile& input : report.inputs) {
+    json["inputs"].push_back({{"path", input.path}, {"sha256", input.sha256}});
+  }
   json["scenarios"] = Json::array();
   for (const RerunScenario& scenario : report.scenarios) {
     Json files = Json::array();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "comparison/comparison.h"
+#include "features/paper/package_manifest.h"
 
 namespace mbv {
 
@@ -82,6 +83,7 @@ struct OtherVersion {
 
 struct RerunReport {
   std::string archive;
+  std::vector<PackedFile> inputs = {};  ///< of the archive
   std::vector<OtherVersion> other_versions;
   std::vector<RerunScenario> scenarios;
 

@@ -260,6 +260,9 @@ class PackageVerifier {
     }
     outcome_.exit_code = 2;
     report_.other_versions = OtherVersions(package());
+    for (const PackedFile& file : package().files) {
+      if (file.path.starts_with(std::string(kInputsFolder) + "/")) report_.inputs.push_back(file);
+    }
     bool ran = true;
     for (size_t k = 0; k < package().scenarios.size(); ++k) {
       const PackedScenario& scenario = package().scenarios[k];

@@ -287,8 +287,8 @@ class ScenarioRun {
     const bool in_phases = phases.front().scenario.phase.has_value();
     if (in_phases && options_.after_judgement) {
       outcome_.diagnostics.AddError(
-          file_, "phases: --certify proves forces of one mechanism, and each phase is another",
-          "prove those of one phase: a scenario with contacts: […]");
+          file_, "phases: --certify and --derivatives are of one mechanism, and each phase is another",
+          "one phase alone: a scenario with contacts: […]");
       return BadInput();
     }
     prepared_ = std::move(phases.front());
@@ -656,7 +656,7 @@ class ScenarioRun {
     for (const PictureFile& picture : pictures_) {
       write("snapshots/" + picture.name, picture.content);
     }
-    write("inputs.json", ToJson(inputs_.files()));
+    write("inputs.json", InputsJson(inputs_.files(), options_.scenario.set));
     write("summary.json", ToJson(report_));
     if (options_.more_files) {
       for (const auto& [name, content] : options_.more_files(report_)) write(name, content);

@@ -235,7 +235,7 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
   if (!options.out_dir.empty()) {
     OutputFolder folder(options.out_dir, prepared->base.name + "/" + prepared->scenario.name);
     std::vector<std::pair<std::string, std::string>> files = StiffnessFiles(run);
-    files.emplace_back("inputs.json", ToJson(inputs.files()));
+    files.emplace_back("inputs.json", InputsJson(inputs.files(), options.scenario.set));
     std::erase_if(files,
                   [&](const auto& file) { return file.first == "report.html" && !options.page; });
     const std::string trouble = folder.WriteAll(files);

@@ -111,7 +111,7 @@ StudyOutcome Finish(const StudyBench& bench, bool whole, StudyFolder* folder,
     outcome.exit_code = outcome.report->exit_code();
     files = {{"summary.json", ToJson(*outcome.report)},
              {"report.html", ToHtml(*outcome.report)},
-             {"inputs.json", ToJson(bench.inputs())}};
+             {"inputs.json", InputsJson(bench.inputs())}};
     for (StudyPlot& plot : StudyPlots(*outcome.report)) {
       files.emplace_back("plots/" + plot.file, std::move(plot.svg));
     }

@@ -263,6 +263,41 @@ TEST(CertifyShipped, CoarseIntervalsHoldFineValues) {
   EXPECT_GT(values, 10000u);
 }
 
+// Instants of the IFToMM library's problems A01 to A05 (docs/results/proofs.md): what is published,
+// or follows from the conservation of energy, within the digits that the commands have.
+TEST(CertifyShipped, ProvesPublishedInstants) {
+  const struct {
+    const char *scenario, *channel;
+    double published, digits;
+  } kInstants[] = {{"pendulum/instant", "pin.reaction.fy", 3.0 * 9.81, 1e-13},
+                   {"n_four_bar/instant", "motor.force", 0.0, 1e-13},
+                   {"andrews_squeezer/instant", "motor.force", 0.033, 1e-15},
+                   {"andrews_squeezer/end", "motor.force", 0.033, 1e-8},
+                   {"bricard/turn", "motor.force", -9.81, 1e-13},
+                   {"flyball_governor/instant", "slider.force", 0.0, 1e-9},
+                   {"flyball_governor/instant", "rod1.force", 0.0, 1e-9},
+                   {"flyball_governor/instant", "rod2.force", 0.0, 1e-9}};
+  for (const auto& instant : kInstants) {
+    Diagnostics found;
+    const auto prepared =
+        Prepare(SourcePath(fmt::format("/scenarios/{}.yaml", instant.scenario)), {}, &found);
+    ASSERT_TRUE(prepared.has_value()) << found.Text();
+    const auto off = [&](const Mechanism& mechanism) {
+      const Certificate certificate =
+          Certify(mechanism, prepared->scenario.motion, {}, {.samples = 1});
+      const SampleProof& start = certificate.samples.front();
+      EXPECT_TRUE(start.proved()) << start.why_not;
+      const ProvedValue& value = ValueOf(start, instant.channel);
+      return std::abs(value.value - instant.published) + value.radius;
+    };
+    Mechanism mechanism = prepared->mechanisms.reference;
+    EXPECT_LE(off(mechanism), instant.digits) << instant.scenario << " " << instant.channel;
+    mechanism.gravity_W *= 1.0 + 1e-5;
+    for (Body& body : mechanism.bodies) body.p_BoBcm_B *= 1.0 + 1e-5;
+    EXPECT_GT(off(mechanism), instant.digits) << instant.scenario << " " << instant.channel;
+  }
+}
+
 struct Case {
   Mechanism mechanism;
   Motion motion;

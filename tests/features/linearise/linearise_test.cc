@@ -1,4 +1,4 @@
-// Frequencies and derivatives against formulas by hand, and every term that somebody else's may
+// Frequencies and derivatives against formulas by hand, and every term that a user's matrix may
 // lack.
 #include "features/linearise/linearise.h"
 
