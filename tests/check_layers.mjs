@@ -20,6 +20,7 @@ const LIBRARIES = {
   'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },
   'MPFI': { headers: ['boost/multiprecision/mpfi'], target: 'MPFI::MPFI' },
   'KLU': { headers: ['suitesparse/'], target: 'KLU::KLU' },
+  'NLopt': { headers: ['nlopt'], target: 'NLOPT::NLOPT' },
   'libzip': { headers: ['zip.h'], target: 'PkgConfig::LIBZIP' },
   'libpng': { headers: ['png.h'], target: 'PNG::PNG' },
   'muParser': { headers: ['muParser'], target: 'muparser::muparser' },

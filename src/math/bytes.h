@@ -38,10 +38,15 @@ class ByteWriter {
     (*this)(text.size());
     bytes += text;
   }
-  void operator()(const Vec3& value) { Raw(value.data(), sizeof(double) * 3); }
-  void operator()(const MatX& values) {
-    (*this)(values.rows()), (*this)(values.cols());
+  template <int R, int C>
+  void operator()(const Eigen::Matrix<double, R, C>& values) {
+    if constexpr (R < 0 || C < 0) (*this)(values.rows()), (*this)(values.cols());
     Raw(values.data(), static_cast<size_t>(values.size()) * sizeof(double));
+  }
+  void operator()(const Pose& value) { (*this)(value.matrix()); }
+  template <typename A, typename B>
+  void operator()(const std::pair<A, B>& value) {
+    (*this)(value.first), (*this)(value.second);
   }
   template <typename T>
   void operator()(const std::vector<T>& values) {
@@ -80,13 +85,21 @@ class ByteReader {
     text.assign(Count(1), '\0');
     Raw(text.data(), text.size());
   }
-  void operator()(Vec3& value) { Raw(value.data(), sizeof(double) * 3); }
-  void operator()(MatX& values) {
-    const size_t rows = Count(0), columns = Count(0);
-    if (columns > 0 && rows > left() / sizeof(double) / columns) good_ = false;
-    if (!good_) return;
-    values.resize(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
-    Raw(values.data(), rows * columns * sizeof(double));
+  template <int R, int C>
+  void operator()(Eigen::Matrix<double, R, C>& values) {
+    if constexpr (R < 0 || C < 0) {
+      const size_t rows = Count(0), columns = Count(0);
+      if (columns > 0 && rows > left() / sizeof(double) / columns) good_ = false;
+      if (C > 0 && columns != static_cast<size_t>(C)) good_ = false;
+      if (!good_) return;
+      values.resize(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+    }
+    Raw(values.data(), static_cast<size_t>(values.size()) * sizeof(double));
+  }
+  void operator()(Pose& value) { (*this)(value.matrix()); }
+  template <typename A, typename B>
+  void operator()(std::pair<A, B>& value) {
+    (*this)(value.first), (*this)(value.second);
   }
   template <typename T>
   void operator()(std::vector<T>& values) {

@@ -217,13 +217,14 @@ bool Contains(const Spans& spans, double x) {
 class RangeTracer {
  public:
   RangeTracer(const PoseSpace& space, const PlacedPose& start, int threads,
-              const std::function<void(double)>& progress)
+              const std::function<void(double)>& progress, ResultLog log)
       : space_(space),
         settings_(space.settings()),
         start_(start),
         threads_(threads),
         progress_(progress),
-        count_(settings_.ranged.size()) {}
+        count_(settings_.ranged.size()),
+        log_(std::move(log)) {}
 
   TracedSet Trace() {
     if (space_.over() > 2) {
@@ -256,7 +257,7 @@ class RangeTracer {
   static constexpr int kFinest = 64;
   struct AtValue {
     TracedSet traced;
-    std::vector<Spans> rows;
+    std::vector<Spans> rows = {};
   };
 
   [[nodiscard]] double ValueOf(const ValueKey& key, size_t r) const {
@@ -296,26 +297,29 @@ class RangeTracer {
         wave.push_back(*first);
         rest.erase(first);
       }
-      std::vector<AtValue> found(wave.size());
-      std::atomic<size_t> next = 0;
-      const auto run = [&] {
-        for (size_t i = next++; i < wave.size(); i = next++) found[i] = TraceAt(wave[i]);
-      };
-      std::vector<std::thread> others;
-      for (int t = 1; t < threads_ && static_cast<size_t>(t) < wave.size(); ++t) {
-        others.emplace_back(run);
-      }
-      run();
-      for (std::thread& other : others) other.join();
+      auto found = log_.Get<std::vector<TracedSet>>([&] {
+        std::vector<TracedSet> traced(wave.size());
+        std::atomic<size_t> next = 0;
+        const auto run = [&] {
+          for (size_t i = next++; i < wave.size(); i = next++) traced[i] = TraceAt(wave[i]);
+        };
+        std::vector<std::thread> others;
+        for (int t = 1; t < threads_ && static_cast<size_t>(t) < wave.size(); ++t) {
+          others.emplace_back(run);
+        }
+        run();
+        for (std::thread& other : others) other.join();
+        return traced;
+      });
       for (size_t i = 0; i < wave.size(); ++i) {
-        const TracedSet& traced = found[i].traced;
+        TracedSet& traced = found[i];
         set_.closings += traced.closings;
         if (!traced.summary.ok()) {
           set_.summary = traced.summary;
           return false;
         }
         largest_error_ = std::max(largest_error_, traced.error);
-        values_[wave[i]] = std::move(found[i]);
+        values_[wave[i]] = {std::move(traced)};
       }
       open = std::move(rest);
       if (progress_) {
@@ -340,7 +344,7 @@ class RangeTracer {
     return neighbours;
   }
 
-  [[nodiscard]] AtValue TraceAt(const ValueKey& key) const {
+  [[nodiscard]] TracedSet TraceAt(const ValueKey& key) const {
     PoseSpace own = space_;
     std::vector<PlacedPose> seeds;
     const long before = own.closings();
@@ -358,15 +362,15 @@ class RangeTracer {
     for (const AtValue* neighbour : Neighbours(key)) {
       for (const SpacePose& pose : neighbour->traced.inside) offer(pose);
     }
-    AtValue value;
+    TracedSet traced;
     if (seeds.empty()) {
-      value.traced.summary = RunSummary::Done();
-      value.traced.measure = value.traced.error = 0.0;
+      traced.summary = RunSummary::Done();
+      traced.measure = traced.error = 0.0;
     } else {
-      value.traced = TraceFrom(own, seeds);
+      traced = TraceFrom(own, seeds);
     }
-    value.traced.closings = own.closings() - before + value.traced.closings;
-    return value;
+    traced.closings += own.closings() - before;
+    return traced;
   }
 
   // The measure of all sections together; returns the scan lines' share of its error.
@@ -529,6 +533,7 @@ class RangeTracer {
   const int threads_;
   const std::function<void(double)>& progress_;
   const size_t count_;
+  ResultLog log_;
   int spacing_ = kFinest;
   std::map<ValueKey, AtValue> values_;
   std::vector<Spans> region_;
@@ -539,9 +544,9 @@ class RangeTracer {
 }  // namespace
 
 TracedSet TraceRange(const PoseSpace& space, const PlacedPose& start, int threads,
-                     const std::function<void(double)>& progress) {
+                     const std::function<void(double)>& progress, ResultLog log) {
   const auto began = std::chrono::steady_clock::now();
-  TracedSet set = RangeTracer(space, start, threads, progress).Trace();
+  TracedSet set = RangeTracer(space, start, threads, progress, std::move(log)).Trace();
   set.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return set;
 }

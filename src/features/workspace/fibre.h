@@ -47,6 +47,7 @@ class Fibre {
 
 /// Of one or two free coordinates; kUnsupported of three.
 [[nodiscard]] TracedSet TraceRange(const PoseSpace& space, const PlacedPose& start, int threads,
-                                   const std::function<void(double)>& progress = {});
+                                   const std::function<void(double)>& progress = {},
+                                   ResultLog log = {});
 
 }  // namespace mbv

@@ -7,7 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <deque>
+#include <iterator>
 #include <map>
 #include <set>
 #include <thread>
@@ -28,6 +28,7 @@ constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]
 constexpr int kMostStrides = 10000;
 constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
 constexpr double kMostCorners = 4e6;
+constexpr size_t kKeptAtOnce = 4096;  // of corners or cuts that are kept at once
 constexpr std::array<int, 4> kUsualResolution = {0, 400, 240, 64};
 
 struct LatticeHash {
@@ -44,6 +45,20 @@ struct Corner {
   int bound = -1;
   SpacePose pose;  // where it closes
 };
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<Corner>& corner) {
+  visit(corner.inside), visit(corner.closes), visit(corner.passes), visit(corner.bound);
+  visit(corner.pose);
+}
+
+struct Cut {
+  double share = 0.5;
+  int bound = -1, vertex = -1;
+};
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<Cut>& cut) {
+  visit(cut.share), visit(cut.bound), visit(cut.vertex);
+}
 
 // Calls work(i, its own space) for all i.
 void OnThreads(size_t count, int threads, const PoseSpace& space, std::atomic<long>* closings,
@@ -69,13 +84,14 @@ struct Simplex {
 class Flooder {
  public:
   Flooder(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
-          const FloodPlan& plan, const std::function<void(double)>& progress)
+          const FloodPlan& plan, const std::function<void(double)>& progress, ResultLog log)
       : space_(space),
         home_(home),
         settings_(settings),
         progress_(progress),
         k_(space.over()),
-        fibre_(space.settings()) {
+        fibre_(space.settings()),
+        log_(std::move(log)) {
     set_.step = plan.step;
     set_.summary = plan.summary;
   }
@@ -190,19 +206,20 @@ class Flooder {
     std::vector<Lattice> front = {{0, 0, 0}};
     while (!front.empty()) {
       // Each front at once; what it finds is taken in its order.
-      std::vector<std::vector<std::pair<Lattice, Corner>>> found(front.size());
-      OnThreads(front.size(), settings_.threads, space_, &closings_, [&](size_t i, PoseSpace& own) {
-        PlacedPose from;
-        const auto at = corners_.find(front[i]);
-        if (!own.Place(at->second.pose, &from)) return;
-        for (int c = 0; c < k_; ++c) {
-          for (const int sign : {-1, 1}) {
-            Lattice key = front[i];
-            key.at(static_cast<size_t>(c)) += sign * spacing;
-            found[i].emplace_back(key, Visit(own, from, key));
-          }
-        }
-      });
+      auto found = ForAll<std::vector<std::pair<Lattice, Corner>>>(
+          front.size(), [&](size_t i, PoseSpace& own) {
+            std::vector<std::pair<Lattice, Corner>> around;
+            PlacedPose from;
+            if (!own.Place(corners_.find(front[i])->second.pose, &from)) return around;
+            for (int c = 0; c < k_; ++c) {
+              for (const int sign : {-1, 1}) {
+                Lattice key = front[i];
+                key.at(static_cast<size_t>(c)) += sign * spacing;
+                around.emplace_back(key, Visit(own, from, key));
+              }
+            }
+            return around;
+          });
       std::set<Lattice> next;
       for (auto& list : found) {
         for (auto& [key, corner] : list) {
@@ -234,6 +251,28 @@ class Flooder {
 
   void Report(double fraction) const {
     if (progress_) progress_(fraction);
+  }
+  // work(i, a space of its own) for all i, kept batch by batch.
+  template <typename T, typename Work>
+  std::vector<T> ForAll(size_t count, const Work& work,
+                        const std::function<void(double)>& progress = {}) {
+    std::vector<T> all;
+    all.reserve(count);
+    for (size_t first = 0; first < count; first += kKeptAtOnce) {
+      const size_t size = std::min(kKeptAtOnce, count - first);
+      auto [results, closings] = log_.Get<std::pair<std::vector<T>, long>>([&] {
+        std::vector<T> computed(size);
+        std::atomic<long> closed = 0;
+        OnThreads(size, settings_.threads, space_, &closed,
+                  [&](size_t i, PoseSpace& own) { computed[i] = work(first + i, own); });
+        return std::pair(std::move(computed), closed.load());
+      });
+      results.resize(size);
+      std::ranges::move(results, std::back_inserter(all));
+      closings_ += closings;
+      if (progress) progress(static_cast<double>(first + size) / static_cast<double>(count));
+    }
+    return all;
   }
 
   template <typename F>
@@ -294,12 +333,10 @@ class Flooder {
       });
     }
     const std::vector<std::pair<Lattice, Lattice>> list(wanted.begin(), wanted.end());
-    std::vector<Corner> found(list.size());
-    OnThreads(list.size(), settings_.threads, space_, &closings_, [&](size_t i, PoseSpace& own) {
+    auto found = ForAll<Corner>(list.size(), [&](size_t i, PoseSpace& own) {
       PlacedPose from;
-      if (own.Place(corners_.find(list[i].second)->second.pose, &from)) {
-        found[i] = Visit(own, from, list[i].first);
-      }
+      const bool placed = own.Place(corners_.find(list[i].second)->second.pose, &from);
+      return placed ? Visit(own, from, list[i].first) : Corner();
     });
     for (size_t i = 0; i < list.size(); ++i) Take(list[i].first, std::move(found[i]));
   }
@@ -385,10 +422,6 @@ class Flooder {
   }
 
   using Edge = std::pair<Lattice, Lattice>;  // from inside to outside
-  struct Cut {
-    double share = 0.5;
-    int bound = -1, vertex = -1;
-  };
   struct EdgeHash {
     size_t operator()(const Edge& e) const {
       return LatticeHash()(e.first) * 31u + LatticeHash()(e.second);
@@ -420,17 +453,12 @@ class Flooder {
       });
     }
     const std::vector<Edge> edges(wanted.begin(), wanted.end());
-    std::vector<Cut> cuts(edges.size());
-    std::atomic<size_t> done = 0;
-    OnThreads(edges.size(), settings_.threads, space_, &closings_, [&](size_t i, PoseSpace& own) {
-      cuts[i] = CutOf(own, edges[i]);
-      if (++done % 4096 == 0 && level == settings_.halvings) {
-        Report(0.6 + 0.4 * static_cast<double>(done) / static_cast<double>(edges.size()));
-      }
-    });
-    for (size_t i = 0; i < edges.size(); ++i) {
-      cuts_.emplace(edges[i], cuts[i]);
-    }
+    const auto cuts = ForAll<Cut>(
+        edges.size(), [&](size_t i, PoseSpace& own) { return CutOf(own, edges[i]); },
+        [&](double done) {
+          if (level == settings_.halvings) Report(0.6 + 0.4 * done);
+        });
+    for (size_t i = 0; i < edges.size(); ++i) cuts_.emplace(edges[i], cuts[i]);
   }
 
   [[nodiscard]] Cut CutOf(const PoseSpace& space, const Edge& edge) const {
@@ -691,11 +719,12 @@ class Flooder {
   const std::function<void(double)>& progress_;
   const int k_;
   const Fibre fibre_;
+  ResultLog log_;
   FloodedSet set_;
   std::unordered_map<Lattice, Corner, LatticeHash> corners_;
   std::array<std::set<Lattice>, 6> cells_, refined_;  // by level: not refined; refined
   std::unordered_map<Edge, Cut, EdgeHash> cuts_;
-  std::atomic<long> closings_ = 0;
+  long closings_ = 0;
   int waves_ = 0;
 };
 
@@ -760,9 +789,10 @@ FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodS
 }
 
 FloodedSet FloodSet(const PoseSpace& space, const PlacedPose& home, const FloodSettings& settings,
-                    const FloodPlan& plan, const std::function<void(double)>& progress) {
+                    const FloodPlan& plan, const std::function<void(double)>& progress,
+                    ResultLog log) {
   const auto start = std::chrono::steady_clock::now();
-  FloodedSet set = Flooder(space, home, settings, plan, progress).Flood();
+  FloodedSet set = Flooder(space, home, settings, plan, progress, std::move(log)).Flood();
   set.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return set;
 }

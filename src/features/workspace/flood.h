@@ -16,6 +16,7 @@
 
 #include "base/run_summary.h"
 #include "features/workspace/pose_space.h"
+#include "features/workspace/resume.h"
 
 namespace mbv {
 
@@ -67,6 +68,7 @@ struct FloodPlan {
 
 [[nodiscard]] FloodedSet FloodSet(const PoseSpace& space, const PlacedPose& home,
                                   const FloodSettings& settings, const FloodPlan& plan,
-                                  const std::function<void(double)>& progress = {});
+                                  const std::function<void(double)>& progress = {},
+                                  ResultLog log = {});
 
 }  // namespace mbv

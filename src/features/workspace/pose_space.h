@@ -98,6 +98,13 @@ struct SpacePose {
   double side = 1.0;            ///< orientation of N
 };
 
+/// See math/bytes.h.
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<SpacePose>& pose) {
+  visit(pose.X_FM), visit(pose.coupled), visit(pose.at), visit(pose.watched), visit(pose.margin);
+  visit(pose.side);
+}
+
 /// A pose with its motions.
 struct PlacedPose {
   SpacePose pose;

@@ -13,7 +13,9 @@
 #include <thread>
 
 #include "kinematics/constraints.h"
+#include "kinematics/singularity.h"
 #include "reference/force_solver.h"
+#include "reference/frame_stiffness.h"
 
 namespace mbv {
 namespace {
@@ -21,6 +23,7 @@ namespace {
 constexpr double kRankShare = 1e-9;                        // smaller singular values are none
 constexpr double kSingularShare = 1e-12;                   // of D: no (1)
 constexpr double kStiffnessStep = 1e-5;                    // [rad, characteristic lengths]
+constexpr size_t kRankPoses = 256;                         // of the set, about
 constexpr Eigen::Index kMostDrives = 12;                   // of corners
 constexpr double kMostVertices = 4096, kMostFacets = 256;  // of redundant drives
 constexpr Eigen::Index kMostHullVertices = 100;            // corners in three dimensions
@@ -196,15 +199,32 @@ Limits LimitsOf(const Mechanism& m) {
   return limits;
 }
 
+// A single chain from the base to the output's body.
+struct Limb {
+  int drive = -1;
+  std::vector<int> joints;  // from the output on; none: a drive along a line
+  Vec3 p = Vec3::Zero();    // on the output's body, in it
+};
+
+std::vector<Command> CommandsOf(const SpaceSettings& settings) {
+  std::vector<Command> commands;
+  for (const NamedCoordinate& named : settings.coordinates) {
+    commands.push_back({named.name, {{named.coordinate, 1.0}}, {}});
+  }
+  return commands;
+}
+
 class QualityMapper {
  public:
-  /// All coordinates of `space` are free.
-  QualityMapper(const PoseSpace& space, const std::string& output)
+  /// All coordinates of `space` are free. `poses`: some of the set.
+  QualityMapper(const PoseSpace& space, const std::string& output,
+                const std::vector<std::vector<Pose>>& poses)
       : space_(space),
         mechanism_(space.mechanism()),
         length_(space.length()),
         limits_(LimitsOf(mechanism_)),
-        output_(mechanism_.outputs[static_cast<size_t>(mechanism_.FindOutput(output))]) {
+        output_(mechanism_.outputs[static_cast<size_t>(mechanism_.FindOutput(output))]),
+        meter_(mechanism_, CommandsOf(space.settings()), poses) {
     for (const Drive& drive : mechanism_.drives) {
       servos_ = servos_ && std::isfinite(drive.stiffness);
       drive_unit_.push_back(PositionUnit(mechanism_, drive) == "m" ? 1.0 : length_);
@@ -212,7 +232,7 @@ class QualityMapper {
     servos_ = servos_ && !mechanism_.drives.empty();
     dofs_ = static_cast<Eigen::Index>(space.settings().coordinates.size() -
                                       mechanism_.prescribed.size());
-    FindPoints();
+    FindLimbs();
     AddIndices();
   }
 
@@ -238,23 +258,16 @@ class QualityMapper {
     const VecX sizes = Eigen::JacobiSVD<MatX>(counted).singularValues();
     size_t i = 0;
     const auto put = [&](double value) { (*values)[static_cast<Eigen::Index>(i++)] = value; };
-    if (!(sizes[n - 1] > kSingularShare * sizes[0])) {
-      put(0.0);
-      return true;
+    // (4)
+    const auto distances = meter_.At(states);
+    for (const SingularityKind kind :
+         {SingularityKind::kForward, SingularityKind::kInverse, SingularityKind::kConstraint}) {
+      put(distances[static_cast<size_t>(kind)].value);
     }
+    if (!(sizes[n - 1] > kSingularShare * sizes[0])) return true;
     // Motions at unit speed of the drives together, |U D y| = 1: y = back z, |z| = 1.
     const MatX R = Eigen::HouseholderQR<MatX>(counted).matrixQR().topRows(n);
     const MatX back = R.triangularView<Eigen::Upper>().solve(MatX::Identity(n, n));
-    // (4)
-    MatX S(3 * static_cast<Eigen::Index>(points_.size()), n);
-    for (size_t p = 0; p < points_.size(); ++p) {
-      S.middleRows<3>(3 * static_cast<Eigen::Index>(p)) =
-          TwistOf(output_.body, points_[p], states, T).bottomRows<3>();
-    }
-    S *= back / std::sqrt(static_cast<double>(points_.size()));
-    const VecX rms = Eigen::JacobiSVD<MatX>(S).singularValues();
-    put(rms[0] > 0.0 ? 1.0 / rms[0] : kNan);
-    put(Eigen::JacobiSVD<MatX>(CoordinateRates(states, T) * back).singularValues().minCoeff());
     // Twists with lengths by the characteristic one, drives in units of theirs.
     MatX scaled = W * back;
     scaled.topRows<3>() *= length_;
@@ -279,9 +292,13 @@ class QualityMapper {
     // (5)
     MatX M = T.transpose() * internal::Momenta(mechanism_, states, T);
     M = 0.5 * (M + M.transpose()).eval();
-    if (!redundant()) {
+    if (redundant()) {
+      const MatX mobility = D * M.ldlt().solve(D.transpose());
+      for (Eigen::Index k = 0; k < D.rows(); ++k) put(1.0 / mobility(k, k));
+    } else {
       const MatX alone = D.inverse();
       for (Eigen::Index k = 0; k < n; ++k) put(alone.col(k).dot(M * alone.col(k)));
+      for (const Limb& limb : limbs_) put(Transmission(limb, states, T * alone.col(limb.drive)));
     }
     if (limits_.forces) {
       const VecX per_mass = -W.bottomRows<3>().transpose() * mechanism_.gravity_W;
@@ -289,15 +306,28 @@ class QualityMapper {
               ? Payload(Y.transpose() * ForcesAtRest(states, T), Y.transpose() * per_mass, reach)
               : kNan);
     }
+    std::optional<MatX> stiffness;
     if (servos_) {
-      const std::optional<MatX> stiffness = Stiffness(at, states, T, D);
+      stiffness = Stiffness(at, states, T, D);
       put(stiffness ? Frequency(*stiffness, M) : kNan);
-      const auto [soft, stiff] =
-          stiffness ? OutputStiffness(*stiffness, W.bottomRows<3>()) : std::pair(kNan, kNan);
+    }
+    if (servos_ || elastic()) {
+      const auto [soft, stiff] = elastic()   ? FrameReach(states)
+                                 : stiffness ? OutputStiffness(*stiffness, W.bottomRows<3>())
+                                             : std::pair(kNan, kNan);
       put(soft);
       put(stiff);
     }
     return true;
+  }
+  [[nodiscard]] std::vector<std::string> NoLimb() const {
+    std::vector<std::string> names;
+    for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+      if (std::ranges::find(limbs_, static_cast<int>(d), &Limb::drive) == limbs_.end()) {
+        names.push_back(mechanism_.drives[d].name);
+      }
+    }
+    return names;
   }
 
  private:
@@ -330,18 +360,7 @@ class QualityMapper {
     }
     return D;
   }
-  // Of the set's coordinates, free and held: angles by the characteristic length.
-  [[nodiscard]] MatX CoordinateRates(const BodyStates& states, const MatX& T) const {
-    MatX C(T.cols(), T.cols());
-    Eigen::Index row = 0;
-    for (const NamedCoordinate& named : space_.settings().coordinates) {
-      if (named.coordinate.kind == Coordinate::Kind::kPrescribed) continue;
-      C.row(row) = RateOf(CoordinateRow(mechanism_, named.coordinate, states), T);
-      if (!IsLength(mechanism_, named.coordinate)) C.row(row) *= length_;
-      ++row;
-    }
-    return C;
-  }
+  [[nodiscard]] bool elastic() const { return !mechanism_.beams.empty(); }
   [[nodiscard]] bool redundant() const {
     return dofs_ < static_cast<Eigen::Index>(mechanism_.drives.size());
   }
@@ -353,19 +372,125 @@ class QualityMapper {
     return T.transpose() * internal::Stack(required);
   }
 
-  void FindPoints() {
-    for (const Joint& joint : mechanism_.joints) {
-      if (joint.kind == JointKind::kFree) continue;
-      if (joint.parent == output_.body) points_.push_back(joint.X_PF.translation());
-      if (joint.child == output_.body) points_.push_back(joint.X_CM.translation());
+  // From each joint of the output's body through bodies with two joints to the base.
+  void FindLimbs() {
+    const auto& joints = mechanism_.joints;
+    std::vector<std::vector<int>> joints_of(mechanism_.bodies.size());
+    for (size_t j = 0; j < joints.size(); ++j) {
+      if (joints[j].kind == JointKind::kFree) continue;
+      joints_of[static_cast<size_t>(joints[j].parent)].push_back(static_cast<int>(j));
+      joints_of[static_cast<size_t>(joints[j].child)].push_back(static_cast<int>(j));
     }
-    for (const Drive& drive : mechanism_.drives) {
-      const auto* line = std::get_if<DistanceDrive>(&drive.kind);
+    std::vector<bool> coupled(joints.size(), false), on_line(mechanism_.bodies.size(), false);
+    for (const Coupling& coupling : mechanism_.couplings) {
+      for (const Coupling::Term& term : coupling.terms) {
+        coupled[static_cast<size_t>(term.joint)] = true;
+      }
+    }
+    for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+      const auto* line = std::get_if<DistanceDrive>(&mechanism_.drives[d].kind);
       if (line == nullptr) continue;
-      if (line->body_from == output_.body) points_.push_back(line->p_from);
-      if (line->body_to == output_.body) points_.push_back(line->p_to);
+      const auto is_base = [&](int body) { return body == 0 || body == output_.reference_body; };
+      if (line->body_to == output_.body && is_base(line->body_from)) {
+        limbs_.push_back({static_cast<int>(d), {}, line->p_to});
+      } else if (line->body_from == output_.body && is_base(line->body_to)) {
+        limbs_.push_back({static_cast<int>(d), {}, line->p_from});
+      } else {
+        on_line[static_cast<size_t>(line->body_from)] = true;
+        on_line[static_cast<size_t>(line->body_to)] = true;
+      }
     }
-    points_.push_back(output_.X_BO.translation());
+    for (const int first : joints_of[static_cast<size_t>(output_.body)]) {
+      const Joint& held = joints[static_cast<size_t>(first)];
+      Limb limb{.joints = {},
+                .p = (held.parent == output_.body ? held.X_PF : held.X_CM).translation()};
+      int body = output_.body, joint = first, drives = 0;
+      bool single = true;
+      while (single) {
+        limb.joints.push_back(joint);
+        single = !coupled[static_cast<size_t>(joint)];
+        for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+          const auto* on = std::get_if<JointDrive>(&mechanism_.drives[d].kind);
+          if (on == nullptr || on->joint != joint) continue;
+          limb.drive = static_cast<int>(d);
+          ++drives;
+        }
+        const Joint& passed = joints[static_cast<size_t>(joint)];
+        body = passed.parent == body ? passed.child : passed.parent;
+        if (body == 0 || body == output_.reference_body) break;
+        const auto& around = joints_of[static_cast<size_t>(body)];
+        single = single && around.size() == 2 && !on_line[static_cast<size_t>(body)];
+        if (single) joint = around[0] == joint ? around[1] : around[0];
+      }
+      if (single && drives == 1) limbs_.push_back(std::move(limb));
+    }
+    std::ranges::sort(limbs_, {}, &Limb::drive);
+    // One for each drive: else several share its force.
+    std::vector<int> limbs_of(mechanism_.drives.size(), 0);
+    for (const Limb& limb : limbs_) ++limbs_of[static_cast<size_t>(limb.drive)];
+    std::erase_if(limbs_,
+                  [&](const Limb& limb) { return limbs_of[static_cast<size_t>(limb.drive)] > 1; });
+  }
+
+  // (10) [°]; `twists` of the moving bodies while the drive moves alone.
+  [[nodiscard]] double Transmission(const Limb& limb, const BodyStates& states,
+                                    const MatX& twists) const {
+    const Vec3 p_W = states.X_WB[static_cast<size_t>(output_.body)] * limb.p;
+    const Vec3 p_R = states.X_WB[static_cast<size_t>(output_.reference_body)].inverse() * p_W;
+    const Vec3 v = TwistOf(output_.body, limb.p, states, twists).bottomRows<3>() -
+                   TwistOf(output_.reference_body, p_R, states, twists).bottomRows<3>();
+    const Vec3 f = ForceOf(limb, states, p_W);
+    const double sizes = f.norm() * v.norm();
+    if (!(sizes > 0.0)) return kNan;
+    return std::asin(std::min(1.0, std::abs(f.dot(v)) / sizes)) * 180.0 / std::numbers::pi;
+  }
+  // By unit force of the drive on the output's body at the point; NaN where there is a moment, too.
+  [[nodiscard]] Vec3 ForceOf(const Limb& limb, const BodyStates& states, const Vec3& p_W) const {
+    if (limb.joints.empty()) {
+      const auto& line =
+          std::get<DistanceDrive>(mechanism_.drives[static_cast<size_t>(limb.drive)].kind);
+      return states.X_WB[static_cast<size_t>(line.body_to)] * line.p_to -
+             states.X_WB[static_cast<size_t>(line.body_from)] * line.p_from;
+    }
+    const ScalarRow drive =
+        CoordinateRow(mechanism_, {Coordinate::Kind::kDrive, limb.drive, 0}, states);
+    // What each joint allows its child, [L ω; v of the point], and the drive's rate with it.
+    std::vector<Vec6> allowed;
+    std::vector<double> rates;
+    for (const int j : limb.joints) {
+      const Joint& joint = mechanism_.joints[static_cast<size_t>(j)];
+      const ConstraintRows rows = RowsOf(joint, states, false, false);
+      const MatX kernel = Eigen::FullPivLU<MatX>(rows.J_child.topRows(rows.rows)).kernel();
+      if (rows.rows == 6) continue;
+      const Vec3 arm = p_W - states.X_WB[static_cast<size_t>(joint.child)].translation();
+      const auto* on =
+          std::get_if<JointDrive>(&mechanism_.drives[static_cast<size_t>(limb.drive)].kind);
+      for (Eigen::Index k = 0; k < kernel.cols(); ++k) {
+        const Vec6 V = kernel.col(k);
+        Vec6 at_point;
+        at_point << length_ * V.head<3>(), V.tail<3>() + Vec3(V.head<3>()).cross(arm);
+        allowed.push_back(at_point);
+        rates.push_back(on->joint == j ? drive.J_child.dot(V) : 0.0);
+      }
+    }
+    MatX A(static_cast<Eigen::Index>(allowed.size()), 6);
+    for (Eigen::Index r = 0; r < A.rows(); ++r) A.row(r) = allowed[static_cast<size_t>(r)];
+    const Eigen::Map<const VecX> b(rates.data(), A.rows());
+    const Vec6 wrench = A.completeOrthogonalDecomposition().solve(b);  // [m / L; f]
+    const bool transmits = (A * wrench - b).norm() <= 1e-9 * b.norm();
+    if (!transmits || wrench.head<3>().norm() > 1e-9 * wrench.tail<3>().norm()) {
+      return Vec3::Constant(kNan);
+    }
+    return wrench.tail<3>();
+  }
+  // (9) of beams and servos, at the poses' shape without weight.
+  [[nodiscard]] std::pair<double, double> FrameReach(const BodyStates& states) const {
+    const StiffnessResult frame = FrameStiffness(
+        mechanism_, states.X_WB, static_cast<int>(&output_ - mechanism_.outputs.data()));
+    const Mat3 C = frame.C.bottomRightCorner<3, 3>();
+    if (!C.allFinite()) return {kNan, kNan};
+    const Vec3 sizes = Eigen::SelfAdjointEigenSolver<Mat3>(C, Eigen::EigenvaluesOnly).eigenvalues();
+    return {1.0 / sizes[2], sizes[0] > kRankShare * sizes[2] ? 1.0 / sizes[0] : kNan};
   }
 
   void Add(std::string name, std::string unit, std::string about, bool low_is_bad = true) {
@@ -376,8 +501,10 @@ class QualityMapper {
         limits_.speeds ? "at the motors' highest speeds" : "per unit speed of each drive";
     const std::string force =
         limits_.forces ? "at the motors' torques" : "per unit force of each drive";
-    Add("type2_distance", "1", "least speed of the drives by that of the output's body (type 2)");
-    Add("type1_distance", "1", "least speed of the coordinates by that of the drives (type 1)");
+    Add("type2_distance", "1", "least speed of the drives by that of the bodies (type 2)");
+    Add("type1_distance", "1",
+        "least speed of the set's coordinates by that of the bodies (type 1)");
+    Add("constraint_distance", "1", "least speed that loops open with, by that of the bodies");
     Add("condition", "1",
         fmt::format("of the twist by the drives' speeds, lengths by {:.4g} m", length_), false);
     Add("manipulability", "1", "product of its singular values");
@@ -390,15 +517,24 @@ class QualityMapper {
     Add("moment_least", "N m", "about every axis, " + force);
     Add("moment_most", "N m", "about the best axis, " + force);
     for (const Drive& drive : mechanism_.drives) {
-      if (redundant()) break;  // none moves alone
       Add("mass_" + drive.name, PositionUnit(mechanism_, drive) == "m" ? "kg" : "kg m²",
-          "as the drive feels it, the others at rest", false);
+          redundant() ? "as the drive feels it, the others without force"
+                      : "as the drive feels it, the others at rest",
+          false);
+    }
+    for (const Limb& limb : limbs_) {
+      if (redundant()) break;  // none moves alone
+      Add("transmission_" + mechanism_.drives[static_cast<size_t>(limb.drive)].name, "°",
+          "90° less the pressure angle between the limb's force on the output's body and the "
+          "velocity there, the other drives at rest");
     }
     if (limits_.forces) Add("payload", "kg", "at the output's origin, held by the motors");
-    if (servos_) {
-      Add("frequency", "Hz", "lowest natural frequency on the servos");
+    if (servos_) Add("frequency", "Hz", "lowest natural frequency on the servos");
+    if (servos_ || elastic()) {
       Add("stiffness_least", "N/m",
-          "at the output's origin on the servos, in the softest direction");
+          elastic() ? "at the output's origin by elastic bodies and servos, without weight, in the "
+                      "softest direction"
+                    : "at the output's origin on the servos, in the softest direction");
       Add("stiffness_most", "N/m", "in the stiffest direction that it moves in");
     }
   }
@@ -491,8 +627,9 @@ class QualityMapper {
   const Limits limits_;
   const Output& output_;
   Eigen::Index dofs_ = 0;
+  const SingularityMeter meter_;
   std::vector<double> drive_unit_;
-  std::vector<Vec3> points_;
+  std::vector<Limb> limbs_;
   std::vector<QualityIndex> indices_;
   bool servos_ = true;
 };
@@ -589,10 +726,17 @@ QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,
     return map;
   }
   map.singular = SingularCurves(question, set);
-  const QualityMapper mapper(placing, output);
+  std::vector<std::vector<Pose>> some;
+  const size_t stride = 1 + set.flooded.lattice.size() / kRankPoses;
+  for (size_t p = 0; p < set.flooded.lattice.size(); p += stride) {
+    const FloodPoint& point = set.flooded.lattice[p];
+    if (point.inside) some.push_back(placing.States(point.pose).X_WB);
+  }
+  const QualityMapper mapper(placing, output, some);
   map.why_none = mapper.WhyNone();
   if (!map.why_none.empty()) return map;
   map.indices = mapper.indices();
+  map.no_limb = mapper.NoLimb();
   std::vector<size_t> inside;
   for (size_t p = 0; p < set.flooded.lattice.size(); ++p) {
     if (set.flooded.lattice[p].inside) inside.push_back(p);

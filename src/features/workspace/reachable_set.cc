@@ -24,7 +24,7 @@ using std::numbers::pi;
 constexpr size_t kMostNamed = 8;         // names in a message
 constexpr double kSingularHome = 1e-10;  // determinants of orthonormal motions below it are zero
 constexpr size_t kMostChecked = 24;
-constexpr double kVolumeShare = 1e-8;
+constexpr double kMostError = 0.2;  // of both ways together, by the measure
 constexpr double kSamePose = 1e-8;  // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 
@@ -587,7 +587,8 @@ void JudgeSet(ReachableSet* result) {
   result->summary = RunSummary::Done();
   const double off = std::abs(traced.measure - flooded.measure);
   const double error = traced.error + flooded.error;
-  result->agree = off <= error && flooded.conflicts == 0 && result->checked > 0 &&
+  const bool sharp = error <= kMostError * std::abs(traced.measure);
+  result->agree = off <= error && sharp && flooded.conflicts == 0 && result->checked > 0 &&
                   result->checked_off < kSamePose;
   result->verdict =
       flooded.conflicts > 0
@@ -597,8 +598,8 @@ void JudgeSet(ReachableSet* result) {
           ? fmt::format(
                 "the reference closes a pose elsewhere: {:.2g} rad or characteristic lengths off",
                 result->checked_off)
-          : fmt::format("the two ways differ by {:.2g} {}, their errors are {:.2g} together", off,
-                        result->unit, error);
+          : fmt::format("the two ways differ by {:.2g} {}, their errors are {:.2g} together{}", off,
+                        result->unit, error, sharp ? "" : ": too large to judge");
 }
 
 std::optional<SetQuestion> ReadQuestion(const Mechanism& mechanism, const SetArguments& arguments,
@@ -607,7 +608,8 @@ std::optional<SetQuestion> ReadQuestion(const Mechanism& mechanism, const SetArg
 }
 
 ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments& arguments,
-                                 const ProgressFunction& progress) {
+                                 const ProgressFunction& progress, const ResumeFolder* folder,
+                                 const SetWays& which) {
   ReachableSet result;
   const Mechanism& m = question.mechanism;
   SpaceSettings settings = question.settings;
@@ -657,35 +659,46 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
   result.start_pose = start.pose;
   result.bounds = space.bounds();
 
-  const FloodPlan plan = PlanFlood(space, start, arguments.flood);
-  if (!plan.summary.ok()) {
+  FloodPlan plan;
+  if (which.lattice) plan = PlanFlood(space, start, arguments.flood);
+  if (which.lattice && !plan.summary.ok()) {
     result.summary = plan.summary;
     result.verdict = plan.summary.message;
     return result;
   }
   // Both ways at once; neither knows of the other.
   const FloodSettings& flood = arguments.flood;
+  const auto log = [&](const char* name) {
+    return folder == nullptr ? ResultLog() : folder->Log(name);
+  };
   std::atomic<double> of_trace = 0.0, of_flood = 0.0;
   const auto trace = [&] {
     const auto report = [&](double f) { of_trace = f; };
-    result.traced = settings.ranged.empty()
-                        ? TraceSet(space, start, report, kVolumeShare, flood.threads)
-                        : TraceRange(space, start, flood.threads, report);
+    result.traced =
+        settings.ranged.empty()
+            ? TraceSet(space, start, report, which.share, flood.threads, log("boundary"))
+            : TraceRange(space, start, flood.threads, report, log("boundary"));
     of_trace = 1.0;
   };
   const auto fill = [&] {
-    result.flooded = FloodSet(space, start, flood, plan, [&](double f) { of_flood = f; });
+    result.flooded = FloodSet(
+        space, start, flood, plan, [&](double f) { of_flood = f; }, log("lattice"));
     of_flood = 1.0;
   };
   std::vector<std::future<void>> ways;
   const auto policy = flood.threads > 1 ? std::launch::async : std::launch::deferred;
-  ways.push_back(std::async(policy, trace));
-  ways.push_back(std::async(policy, fill));
+  if (which.boundary) ways.push_back(std::async(policy, trace));
+  if (which.lattice) ways.push_back(std::async(policy, fill));
   for (std::future<void>& way : ways) {
     while (way.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout) {
       if (progress) progress("workspace", 0.5 * (of_trace + of_flood));
     }
     way.get();
+  }
+  if (!which.boundary || !which.lattice) {
+    result.summary = which.boundary ? result.traced.summary : result.flooded.summary;
+    if (!result.summary.ok()) result.verdict = result.summary.message;
+    return result;
   }
   if (result.traced.summary.ok()) CheckByReference(question, space, &result);
   FindShares(&result);

@@ -85,9 +85,18 @@ struct ReachableSet {
   Diagnostics diagnostics;
 };
 
+/// Which ways are gone: one alone is not judged.
+struct SetWays {
+  bool boundary = true, lattice = true;
+  double share = 1e-8;  ///< of a volume, the error of its boundary
+};
+
+/// With a folder, going on with what an interrupted run of the same question left there.
 [[nodiscard]] ReachableSet ComputeReachableSet(const SetQuestion& question,
                                                const SetArguments& arguments,
-                                               const ProgressFunction& progress = {});
+                                               const ProgressFunction& progress = {},
+                                               const ResumeFolder* folder = nullptr,
+                                               const SetWays& which = {});
 
 /// The verdict of what both ways found.
 void JudgeSet(ReachableSet* set);

@@ -47,8 +47,9 @@ std::string PlaceText(const ReachableSet& set, const Vec3& at) {
   std::vector<std::string> parts;
   for (size_t c = 0; c < set.over.size(); ++c) {
     const std::string& unit = set.over_units[c];
-    parts.push_back(fmt::format("{} {:.4g} {}", set.over[c],
-                                Shown(at[static_cast<Eigen::Index>(c)], unit), ShownUnit(unit)));
+    const double value = Shown(at[static_cast<Eigen::Index>(c)], unit);
+    parts.push_back(fmt::format("{} {:.4g} {}", set.over[c], std::abs(value) < 1e-9 ? 0.0 : value,
+                                ShownUnit(unit)));
   }
   return Joined(parts);
 }
@@ -95,10 +96,10 @@ std::string HeadLine(const SetReport& report) {
 
 Table WaysTable(const SetReport& report) {
   const ReachableSet& set = report.set;
-  Table table{
-      .name = "workspace_ways",
-      .caption = fmt::format("The {} by independent ways [{}]", set.measure, set.unit),
-      .columns = {Text("way"), Digits(set.measure), Digits("poses closed"), Digits("time [s]")}};
+  Table table{.name = "workspace_ways",
+              .caption = fmt::format("The {} by independent ways [{}]", set.measure, set.unit),
+              .columns = {Text("way"), Digits(set.measure), Digits("poses closed"),
+                          Digits("time [s]", On::kTerminal)}};
   const auto row = [&](const char* way, double value, double error, long closings, double wall) {
     if (closings == 0) return;
     table.rows.push_back(
@@ -386,6 +387,11 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
     quality.Add(Fold{"what they mean", {{std::move(about), On::kPage}}}, On::kPage);
     for (const auto& [name, svg] : figures) {
       if (name.starts_with("quality_")) quality.Add(Drawing{svg}, On::kPage);
+    }
+    if (!report.quality.no_limb.empty()) {
+      quality.Note("no transmission angles of " + Joined(report.quality.no_limb, 8) +
+                       ": not one single chain from base to output",
+                   On::kAll);
     }
     if (report.quality.missed > 0) {
       quality.Note(fmt::format("{} poses were not closed by the reference and are left out",

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -33,8 +34,12 @@ constexpr double kTip = 1e-4;  // of a solid's height, by which another part's e
 constexpr int kSpreadRows = 6;
 constexpr int kRays = 8, kChords = 12;  // from home; from each loop
 constexpr size_t kMostSections = 1200;
-constexpr long kEnoughClosings = 1000000;  // beyond, a volume has the error that it has
-constexpr size_t kNearSections = 2;        // on each side, whose poses begin another one
+// Beyond, a volume has the error that it has; a rough one goes on for longer.
+constexpr double kRough = 1e-3;
+constexpr long kEnoughClosings = 1000000, kMostClosings = 6000000;
+constexpr double kEndsShare = 0.1;   // of the progress
+constexpr double kMoved = 0.02;      // of a solid's height, by which its ends have moved
+constexpr size_t kNearSections = 2;  // on each side, whose poses begin another one
 
 // Root of a continuous function with different signs at both ends (Illinois), to rounding.
 template <typename F>
@@ -132,11 +137,13 @@ class Tracer {
       if (next.pose.margin.minCoeff() < 0.0) return std::nullopt;
       at = std::move(next);
     }
-    VecX before;
     for (int i = 0; i < kMostSteps; ++i) {
       const Eigen::PartialPivLU<MatX> lu(at.C_free);
       VecX along = lu.solve(ray);
-      if (!along.allFinite()) return std::nullopt;
+      if (!along.allFinite()) {
+        trouble_ = "poses are lost where the coordinates do not determine them (type 1)";
+        return std::nullopt;
+      }
       along.normalize();
       PlacedPose next;
       while (!space_.Step(at, h * along, &next)) {
@@ -146,7 +153,11 @@ class Tracer {
           return std::nullopt;
         }
       }
-      if (next.pose.margin.minCoeff() < 0.0) return Exit(at, along, h, next);
+      if (next.pose.margin.minCoeff() < 0.0) {
+        auto hit = Exit(at, along, h, next);
+        if (!hit) trouble_ = "poses are lost where a path leaves the set";
+        return hit;
+      }
       length += h;
       if (length > kFar) {
         unbounded_ = true;
@@ -155,6 +166,7 @@ class Tracer {
       at = std::move(next);
       h = std::min(1.5 * h, 0.5 * kLargestStep);
     }
+    trouble_ = "a path does not leave the set";
     return std::nullopt;
   }
   [[nodiscard]] bool unbounded() const { return unbounded_; }
@@ -236,10 +248,10 @@ class Tracer {
     const VecX t = Turned(space_.Slope(at, bound).normalized());
     return (at.N_free * t).dot(before) < 0.0 ? VecX(-t) : t;
   }
-  // At a crossing, from one branch to the other one's side where the set is; returns the rate at
-  // which the margin's slope along n grows.
-  static double BranchOff(const Eigen::Matrix2d& H, const VecX& along, const VecX& into, VecX* t,
-                          VecX* n) {
+  // At a crossing, from one branch to the other one: that ray of it which bounds the set, whose
+  // margin ½ xᵀHx is positive between it and the way back. Returns the rate at which the margin's
+  // slope along n grows.
+  static double BranchOff(const Eigen::Matrix2d& H, const VecX& along, VecX* t, VecX* n) {
     // Directions y with yᵀ H y = 0, by H's axes.
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(H);
     const double angle = std::atan(std::sqrt(-axes.eigenvalues()[0] / axes.eigenvalues()[1]));
@@ -248,7 +260,7 @@ class Tracer {
     Vec2 w2 = std::cos(angle) * a - std::sin(angle) * b;
     const Vec2 way = along.normalized();
     if (std::abs(w1.dot(way)) > std::abs(w2.dot(way))) std::swap(w1, w2);
-    if (w1.dot(Vec2(into)) < 0.0) w1 = -w1;
+    if (way.dot(H * w1) > 0.0) w1 = -w1;
     Vec2 normal(-w1[1], w1[0]);
     if (normal.dot(way) > 0.0) normal = -normal;
     *t = w1;
@@ -262,36 +274,44 @@ class Tracer {
     if (!space_.Step(*curve.base, tau * curve.t + (eta + kBeside) * curve.n, &beside)) return kNan;
     return (beside.pose.margin[curve.bound] - node.pose.margin[curve.bound]) / kBeside;
   }
-  // Second derivatives of a margin, and its slope.
-  bool Curvature(const PlacedPose& at, int bound, Eigen::Matrix2d* H, Vec2* slope) const {
-    constexpr double h = 1e-3;
-    std::array<std::array<double, 3>, 3> f{};
-    for (size_t i = 0; i < 3; ++i) {
-      for (size_t j = 0; j < 3; ++j) {
-        PlacedPose there;
-        const Vec2 step(h * (static_cast<double>(i) - 1.0), h * (static_cast<double>(j) - 1.0));
-        if (!space_.Step(at, step, &there)) return false;
-        f.at(i).at(j) = there.pose.margin[bound];
+  // Second derivatives of a margin beyond a step x from a pose, and its slope there.
+  bool Curvature(const PlacedPose& base, const Vec2& x, int bound, Eigen::Matrix2d* H,
+                 Vec2* slope) const {
+    const auto margins = [&](double h, std::array<std::array<double, 3>, 3>* f, bool corners) {
+      for (size_t i = 0; i < 3; ++i) {
+        for (size_t j = 0; j < 3; ++j) {
+          if (!corners && (i == 1) == (j == 1)) continue;
+          PlacedPose there;
+          const Vec2 step(h * (static_cast<double>(i) - 1.0), h * (static_cast<double>(j) - 1.0));
+          if (!space_.Step(base, x + step, &there)) return false;
+          f->at(i).at(j) = there.pose.margin[bound];
+        }
       }
-    }
+      return true;
+    };
+    constexpr double h = 1e-3, small = 1e-5;
+    std::array<std::array<double, 3>, 3> f{}, near{};
+    if (!margins(h, &f, true) || !margins(small, &near, false)) return false;
     (*H)(0, 0) = (f[2][1] - 2 * f[1][1] + f[0][1]) / (h * h);
     (*H)(1, 1) = (f[1][2] - 2 * f[1][1] + f[1][0]) / (h * h);
     (*H)(0, 1) = (*H)(1, 0) = (f[2][2] - f[2][0] - f[0][2] + f[0][0]) / (4 * h * h);
-    *slope = space_.Slope(at, bound);
+    *slope = Vec2(near[2][1] - near[0][1], near[1][2] - near[1][0]) / (2 * small);
     return true;
   }
-  // The pose where two branches of {margin = 0} cross: its slope vanishes.
-  bool Crossing(const PlacedPose& near, int bound, PlacedPose* at, Eigen::Matrix2d* H) const {
-    *at = near;
+  // Where two branches of {margin = 0} cross, its slope vanishes: from a point of a curve nearby,
+  // at which τ of this curve; second derivatives by steps from the pose found.
+  bool Crossing(const Curve& curve, double* tau, double eta, PlacedPose* at,
+                Eigen::Matrix2d* H) const {
+    Vec2 x = *tau * curve.t + eta * curve.n, slope;
     for (int i = 0; i < 12; ++i) {
-      Vec2 slope;
-      if (!Curvature(*at, bound, H, &slope)) return false;
-      const VecX step = -H->inverse() * slope;
+      if (!Curvature(*curve.base, x, curve.bound, H, &slope)) return false;
+      const Vec2 step = -H->inverse() * slope;
       if (!step.allFinite() || step.norm() > kLargestStep) return false;
-      PlacedPose next;
-      if (!space_.Step(*at, step, &next)) return false;
-      *at = std::move(next);
-      if (step.norm() < 1e-10) return H->determinant() < 0.0;
+      x += step;
+      if (step.norm() >= 1e-10) continue;
+      *tau = x.dot(Vec2(curve.t));
+      return space_.Step(*curve.base, x, at) &&
+             Curvature(*at, Vec2::Zero(), curve.bound, H, &slope) && H->determinant() < 0.0;
     }
     return false;
   }
@@ -318,11 +338,17 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   Vec2 along_start = here.at.C_free * t;
   along_start = {along_start[0] / space_.UnitOf(0), along_start[1] / space_.UnitOf(1)};
   along_start.normalize();
-  // Is the set to the left? Folds look the same way from both sides.
+  // Is the set to the left? Folds look the same way from both sides, along the motion that rests
+  // the coordinates there: another one goes along the boundary, too, and may leave a curved one.
   double left = 0.0;
   {
+    VecX into = slope.normalized();
+    if (space_.bounds()[static_cast<size_t>(here.bound)].kind == SetBound::Kind::kType1) {
+      into = Eigen::JacobiSVD<MatX>(here.at.C_free, Eigen::ComputeFullV).matrixV().rightCols<1>();
+      if (into.dot(slope) < 0.0) into = -into;
+    }
     PlacedPose in;
-    if (!space_.Step(here.at, 1e-3 * slope.normalized(), &in)) return loop;
+    if (!space_.Step(here.at, 1e-3 * into, &in)) return loop;
     const Vec2 d = ScaledAt(in) - x_start;
     left = along_start[0] * d[1] - along_start[1] * d[0] > 0.0 ? 1.0 : -1.0;
   }
@@ -379,17 +405,17 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
         }
         if (singular && Across(curve, tau, e, at.at(k)) < 0.0) {
           // Another branch of the same singularity crosses.
-          if (!Crossing(at.at(k), here.bound, &crossing, &H)) {
+          double s = tau;
+          if (!Crossing(curve, &s, e, &crossing, &H)) {
             failed = true;
             why = "branches of the singularity that cross are not found";
             break;
           }
-          const Vec2 there = ScaledAt(crossing);
-          Vec2 way = ScaledAt(at.at(k)) - ScaledAt(at.at(k - 1));
-          way.normalize();
-          const auto passed = [&](const PlacedPose& p) { return (there - ScaledAt(p)).dot(way); };
-          const double f1 = passed(at.at(k)), f0 = passed(at.at(k - 1));
-          const double s = f1 <= 0.0 ? find(passed, f0, f1) : tau;
+          if (s < 0.0 || s > tau + 0.1 * h) {
+            failed = true;
+            why = "the set is on the other side";
+            break;
+          }
           if (s < first) {
             first = s;
             event = Event::kCrossing;
@@ -452,14 +478,10 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       continue;
     }
     const VecX carried = here.at.N_free * t;
-    VecX along, into;  // at the last node before a crossing
+    VecX along = carried;  // at the last node before a crossing
     if (event == Event::kCrossing && h >= 1e-13) {
       const PlacedPose& last = at[kDegree - 1];
       along = last.N_free * DirectionAt(last, here.bound, carried);
-      into = last.N_free * space_.Slope(last, here.bound);
-    } else {
-      along = carried;
-      into = here.at.N_free * n;
     }
     if (h >= 1e-13) here.at = std::move(at[kDegree]);
     if (event == Event::kCloses) {
@@ -469,8 +491,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
     if (open != 0 && event != Event::kNone) break;
     s0 = rate = 0.0;
     if (event == Event::kCrossing) {
-      const MatX back = here.at.N_free.transpose();
-      rate = BranchOff(H, back * along, back * into, &t, &n);
+      rate = BranchOff(H, here.at.N_free.transpose() * along, &t, &n);
       loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
       h = kFirstStep;
       continue;
@@ -682,30 +703,55 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
   return true;
 }
 
+// A section of a solid.
+struct Found {
+  TracedSection section;
+  std::vector<SpacePose> inside;
+  std::string lost;
+  bool unbounded = false;
+  long closings = 0;
+};
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<Found>& found) {
+  visit(found.section), visit(found.inside), visit(found.lost), visit(found.unbounded);
+  visit(found.closings);
+}
+
 // Sections of a solid and their integral.
 class SolidTracer {
  public:
   SolidTracer(const PoseSpace& space, const PlacedPose& home,
-              const std::function<void(double)>& progress, double share, int threads)
+              const std::function<void(double)>& progress, double share, int threads, ResultLog log)
       : solid_(space),
         flat_(space.Section(2)),
         progress_(progress),
         share_(share),
-        threads_(threads) {
+        threads_(threads),
+        log_(std::move(log)) {
     seeds_.emplace(home.pose.at[2], std::vector<SpacePose>{home.pose});
   }
 
   TracedSet Trace(const PlacedPose& home) {
     TracedSet set;
     set.low = Climb(home, -1.0);
+    Report(0.02);
     set.high = Climb(home, 1.0);
+    Report(0.04);
     if (!(set.high > set.low)) {
       set.summary.stop = solid_.unbounded() ? Stop::kUnreachable : Stop::kNoConvergence;
       set.summary.message = Trouble();
       return set;
     }
     (void)Rule(set.low, set.high);
-    while (Widen(&set)) Prepare({{set.low, set.high}});
+    // Sections anew where an end has moved; a tip more changes them little.
+    double low = set.low, high = set.high;
+    for (int i = 0; Widen(&set); ++i) {
+      Report(kEndsShare * (1.0 - 0.5 / (i + 1)));
+      if (std::max(low - set.low, set.high - high) < kMoved * (set.high - set.low)) break;
+      Prepare({{set.low, set.high}});
+      low = set.low;
+      high = set.high;
+    }
     Integrate(&set);
     if (!lost_.empty()) {
       set.summary.stop = Stop::kNoConvergence;
@@ -723,6 +769,9 @@ class SolidTracer {
   [[nodiscard]] bool unbounded() const { return solid_.unbounded() || unbounded_; }
 
  private:
+  void Report(double fraction) const {
+    if (progress_) progress_(fraction);
+  }
   [[nodiscard]] std::string Trouble() const { return !lost_.empty() ? lost_ : solid_.trouble(); }
 
   // Up (or down) to the last section that there is.
@@ -814,13 +863,6 @@ class SolidTracer {
     return seeds;
   }
 
-  struct Found {
-    TracedSection section;
-    std::vector<SpacePose> inside;
-    std::string lost;
-    bool unbounded = false;
-    long closings = 0;
-  };
   // Traces what a section does not have yet around these poses.
   static void Extend(Tracer* tracer, const std::vector<PlacedPose>& seeds,
                      const std::vector<Vec2>& holes, Found* found) {
@@ -869,24 +911,7 @@ class SolidTracer {
       for (const bool up : {false, true}) {
         if (up ? std::next(at) == sections_.end() : at == sections_.begin()) continue;
         const auto other = up ? std::next(at) : std::prev(at);
-        Tracer tracer = flat_;
-        const long before = tracer.space().closings();
-        tracer.space().Hold(2, other->first);
-        std::vector<PlacedPose> seeds;
-        for (const SpacePose& pose : seeds_[at->first]) {
-          PlacedPose from, to;
-          VecX target = pose.at;
-          target[2] = other->first;
-          if (tracer.space().Place(pose, &from) && tracer.space().Close(from, target, &to) &&
-              to.pose.margin.minCoeff() > 0.0 &&
-              !IsInside(other->second.loops, to.pose.at.head<2>())) {
-            seeds.push_back(std::move(to));
-          }
-        }
-        Found more;
-        more.section = other->second;
-        more.inside = seeds_[other->first];
-        Extend(&tracer, seeds, MiddlesOfHoles(at->second), &more);
+        Found more = log_.Get<Found>([&] { return Extended(at->second, other->second); });
         if (lost_.empty()) lost_ = more.lost;
         if (more.section.loops.size() > other->second.loops.size()) {
           other->second = std::move(more.section);
@@ -894,13 +919,35 @@ class SolidTracer {
           changed.push_back(other->first);
           mended_ = true;
         }
-        closings_ += tracer.space().closings() - before;
+        closings_ += more.closings;
       }
     }
   }
+  // A section with those parts and holes of its neighbour that it does not have yet.
+  [[nodiscard]] Found Extended(const TracedSection& neighbour, const TracedSection& section) const {
+    Tracer tracer = flat_;
+    const long before = tracer.space().closings();
+    tracer.space().Hold(2, section.height);
+    std::vector<PlacedPose> seeds;
+    for (const SpacePose& pose : seeds_.at(neighbour.height)) {
+      PlacedPose from, to;
+      VecX target = pose.at;
+      target[2] = section.height;
+      if (tracer.space().Place(pose, &from) && tracer.space().Close(from, target, &to) &&
+          to.pose.margin.minCoeff() > 0.0 && !IsInside(section.loops, to.pose.at.head<2>())) {
+        seeds.push_back(std::move(to));
+      }
+    }
+    Found more{section, seeds_.at(section.height), {}};
+    Extend(&tracer, seeds, MiddlesOfHoles(neighbour), &more);
+    more.closings = tracer.space().closings() - before;
+    return more;
+  }
 
   double AreaAt(double height) {
-    if (!sections_.contains(height)) Keep(TraceAt(height));
+    if (!sections_.contains(height)) {
+      Keep(log_.Get<Found>([&] { return TraceAt(height); }));
+    }
     return sections_.at(height).area;
   }
   // All of the nodes between these ends at once, from what is known before.
@@ -914,15 +961,18 @@ class SolidTracer {
         }
       }
     }
-    std::vector<Found> found(heights.size());
-    std::atomic<size_t> next = 0;
-    const auto run = [&] {
-      for (size_t i = next++; i < heights.size(); i = next++) found[i] = TraceAt(heights[i]);
-    };
-    std::vector<std::thread> others;
-    for (int t = 1; t < threads_; ++t) others.emplace_back(run);
-    run();
-    for (std::thread& other : others) other.join();
+    auto found = log_.Get<std::vector<Found>>([&] {
+      std::vector<Found> traced(heights.size());
+      std::atomic<size_t> next = 0;
+      const auto run = [&] {
+        for (size_t i = next++; i < heights.size(); i = next++) traced[i] = TraceAt(heights[i]);
+      };
+      std::vector<std::thread> others;
+      for (int t = 1; t < threads_; ++t) others.emplace_back(run);
+      run();
+      for (std::thread& other : others) other.join();
+      return traced;
+    });
     for (Found& one : found) Keep(std::move(one));
   }
 
@@ -965,8 +1015,12 @@ class SolidTracer {
       return total;
     };
     const double start = sum(&Part::error);
-    while (sum(&Part::error) > share_ * sum(&Part::value) && sections_.size() < kMostSections &&
-           closings_ < kEnoughClosings && lost_.empty()) {
+    const auto enough = [&] {
+      const double error = sum(&Part::error), value = sum(&Part::value);
+      return error <= share_ * value ||
+             closings_ >= (error > kRough * value ? kMostClosings : kEnoughClosings);
+    };
+    while (!enough() && sections_.size() < kMostSections && lost_.empty()) {
       const auto worst = std::ranges::max_element(parts, {}, &Part::error);
       const double a = worst->a, b = worst->b, middle = 0.5 * (a + b);
       Prepare({{a, middle}, {middle, b}});
@@ -978,8 +1032,10 @@ class SolidTracer {
       if (progress_ && start > 0.0) {
         const double done = std::log(start / std::max(sum(&Part::error), 1e-300)) /
                             std::log(start / (share_ * sum(&Part::value)));
-        const double enough = static_cast<double>(closings_) / kEnoughClosings;
-        progress_(std::clamp(std::max(done, enough), 0.0, 1.0));
+        const double closed =
+            static_cast<double>(closings_) /
+            (sum(&Part::error) > kRough * sum(&Part::value) ? kMostClosings : kEnoughClosings);
+        Report(kEndsShare + (1.0 - kEndsShare) * std::clamp(std::max(done, closed), 0.0, 1.0));
       }
     }
     set->measure = sum(&Part::value);
@@ -993,6 +1049,7 @@ class SolidTracer {
   std::function<void(double)> progress_;
   const double share_;
   const int threads_;
+  ResultLog log_;
   std::map<double, std::vector<SpacePose>> seeds_;
   std::map<double, TracedSection> sections_;
   std::string lost_;
@@ -1112,15 +1169,14 @@ TracedArc Resampled(const TracedArc& arc, int finer) {
 }
 
 TracedSet TraceSet(const PoseSpace& space, const PlacedPose& home,
-                   const std::function<void(double)>& progress, double share, int threads) {
+                   const std::function<void(double)>& progress, double share, int threads,
+                   ResultLog log) {
   const auto start = std::chrono::steady_clock::now();
   TracedSet set;
-  if (space.over() == 1) {
-    set = TraceLine(space, home);
-  } else if (space.over() == 2) {
-    set = TraceArea(space, {home});
+  if (space.over() < 3) {
+    set = log.Get<TracedSet>([&] { return TraceFrom(space, {home}); });
   } else {
-    SolidTracer tracer(space, home, progress, share, threads);
+    SolidTracer tracer(space, home, progress, share, threads, std::move(log));
     set = tracer.Trace(home);
     if (tracer.unbounded()) set = Unbounded(std::move(set));
   }

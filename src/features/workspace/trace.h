@@ -15,6 +15,7 @@
 
 #include "base/run_summary.h"
 #include "features/workspace/pose_space.h"
+#include "features/workspace/resume.h"
 
 namespace mbv {
 
@@ -46,11 +47,31 @@ struct TracedSet {
   double wall_s = 0.0;
 };
 
+/// See math/bytes.h.
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<TracedArc>& arc) {
+  visit(arc.bound), visit(arc.points);
+}
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<TracedLoop>& loop) {
+  visit(loop.arcs), visit(loop.closed), visit(loop.area), visit(loop.error);
+}
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<TracedSection>& section) {
+  visit(section.height), visit(section.area), visit(section.error), visit(section.loops);
+}
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<TracedSet>& set) {
+  visit(set.summary), visit(set.measure), visit(set.error), visit(set.sections), visit(set.ends);
+  visit(set.inside), visit(set.low), visit(set.high), visit(set.closings), visit(set.wall_s);
+}
+
 /// From a home pose inside all bounds; volumes until their error is this share of them, or a
-/// million poses are closed. Nothing depends on the number of threads.
+/// million poses are closed (six, while it is above a thousandth). Nothing depends on the number of
+/// threads.
 [[nodiscard]] TracedSet TraceSet(const PoseSpace& space, const PlacedPose& home,
                                  const std::function<void(double)>& progress = {},
-                                 double share = 1e-8, int threads = 1);
+                                 double share = 1e-8, int threads = 1, ResultLog log = {});
 
 /// Of one or two dimensions, from several poses inside.
 [[nodiscard]] TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside);

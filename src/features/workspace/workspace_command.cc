@@ -11,14 +11,18 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
+#include "features/workspace/best_design.h"
 #include "features/workspace/constraint_curves.h"
 #include "features/workspace/joint_space.h"
 #include "features/workspace/modes.h"
+#include "features/workspace/resume.h"
 #include "features/workspace/set_report.h"
 #include "features/workspace/workspace.h"
 #include "model_file/load_model.h"
+#include "model_file/yaml/parsed_documents.h"
 #include "scenario/find_model.h"
 #include "verify/model_text.h"
+#include "verify/version.h"
 
 namespace mbv {
 namespace {
@@ -27,7 +31,11 @@ struct WorkspaceArguments {
   std::string model, out = "out";
   std::string modes;  // "drives", "output", "all"; "": a set
   std::vector<std::string> set;
-  bool no_pictures = false, joint_space = false;
+  bool no_pictures = false, joint_space = false, local = false;
+  std::string maximise;
+  std::vector<std::string> over_parameters;
+  int evaluations = 0;
+  unsigned long seed = 1;
   int jobs = 1;
   SetArguments set_of_poses;
   RobotArguments options;
@@ -86,6 +94,42 @@ std::vector<std::pair<TriangleMesh, std::string>> InWorld(
   return surfaces;
 }
 
+// Of all that a set depends on.
+std::string IdentityOf(const WorkspaceArguments& arguments, const std::vector<InputFile>& inputs) {
+  const SetArguments& asked = arguments.set_of_poses;
+  const RobotArguments& robot = arguments.options;
+  Fingerprint sum;
+  for (const auto& [name, version] : Versions()) sum.Add(name + " " + version);
+  for (const InputFile& input : inputs) sum.Add(input.fingerprint);
+  for (const auto& list :
+       {arguments.set, arguments.over_parameters, asked.over, asked.at, asked.from, asked.ranges,
+        asked.cones, asked.for_all, asked.for_some, robot.assembly, robot.plants}) {
+    sum.Add(fmt::format("{}", list.size()));
+    for (const std::string& text : list) sum.Add(text);
+  }
+  for (const std::string& text : {asked.output, robot.base}) sum.Add(text);
+  sum.Add(fmt::format("{} {} {} {} {} {} {}", asked.cross_singularities, asked.flood.resolution,
+                      robot.free_base, robot.closure_tolerance_m, arguments.local,
+                      arguments.evaluations, arguments.seed));
+  return sum.Text();
+}
+
+// Beside the results; found again by whoever asks the same. Null after a message.
+std::unique_ptr<ResumeFolder> ResumeFolderOf(const WorkspaceArguments& arguments,
+                                             const std::string& mechanism,
+                                             const std::vector<InputFile>& inputs) {
+  auto folder = std::make_unique<ResumeFolder>(
+      std::filesystem::path(arguments.out) / mechanism / "workspace.part",
+      IdentityOf(arguments, inputs));
+  if (folder->taken()) {
+    (void)Refuse("another process computes a workspace of this model there",
+                 "choose another folder with --out");
+    return nullptr;
+  }
+  if (folder->resumes()) Say(stderr, "goes on with what an interrupted run left\n");
+  return folder;
+}
+
 using Files = std::vector<std::pair<std::string, std::string>>;
 
 int WriteResults(const WorkspaceArguments& arguments, const std::string& mechanism,
@@ -109,9 +153,11 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   const auto question = ReadQuestion(mechanism, asked, &diagnostics);
   SayText(stderr, diagnostics.Text());
   if (!question) return 2;
+  const auto folder = ResumeFolderOf(arguments, mechanism.name, inputs);
+  if (!folder) return 2;
   SetReport report;
   report.mechanism = mechanism.name;
-  report.set = ComputeReachableSet(*question, asked, progress);
+  report.set = ComputeReachableSet(*question, asked, progress, folder.get());
   line->Clear();
   SayText(stderr, report.set.diagnostics.Text());
   if (report.set.diagnostics.has_errors()) return 2;
@@ -142,6 +188,89 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   nlohmann::ordered_json json = OutcomeJson(mechanism.name, report.agree(), form.measures);
   json["set"] = ToJson(report);
   return WriteResults(arguments, mechanism.name, files, report.agree(), json, inputs);
+}
+
+// "mbverify workspace arm --over x,y --set a=0.35": the set of a design.
+std::string CommandOf(const WorkspaceArguments& arguments, const DesignQuestion& question,
+                      const Design& design) {
+  const SetArguments& asked = arguments.set_of_poses;
+  std::string command = "mbverify workspace " + arguments.model;
+  const auto add = [&](const char* option, const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) command += fmt::format(" {} {}", option, text);
+  };
+  if (!asked.output.empty()) add("--output", {asked.output});
+  add("--over", asked.over);
+  add("--at", asked.at);
+  add("--from", asked.from);
+  add("--range", asked.ranges);
+  add("--cone", asked.cones);
+  add("--for-all", asked.for_all);
+  add("--for-some", asked.for_some);
+  if (asked.cross_singularities) command += " --cross-singularities";
+  add("--set", arguments.set);
+  for (size_t k = 0; k < question.parameters.size(); ++k) {
+    command += fmt::format(" --set {}={:.17g}", question.parameters[k].name,
+                           design.at[static_cast<Eigen::Index>(k)]);
+  }
+  return command;
+}
+
+// The design whose set is largest.
+int BestOfDesigns(const WorkspaceArguments& arguments, const Mechanism& mechanism,
+                  const ProgressFunction& progress, ProgressLine* line,
+                  const std::vector<InputFile>& inputs) {
+  SetArguments asked = arguments.set_of_poses;
+  asked.flood.threads = arguments.jobs;
+  Diagnostics diagnostics;
+  DesignQuestion question{
+      .parameters = ReadDesignParameters(mechanism, arguments.over_parameters, &diagnostics),
+      .global = !arguments.local,
+      .evaluations = arguments.evaluations,
+      .seed = arguments.seed};
+  if (arguments.over_parameters.empty() || arguments.maximise.empty()) {
+    diagnostics.AddError(arguments.maximise.empty() ? "--over-parameters" : "--maximise",
+                         "a search of designs needs --maximise and --over-parameters",
+                         "--maximise volume --over-parameters NAME=LOW:HIGH");
+  }
+  if (arguments.joint_space || !arguments.modes.empty()) {
+    diagnostics.AddError("--maximise", "it asks for another thing than --modes and --joint-space",
+                         "leave them out");
+  }
+  (void)ReadQuestion(mechanism, asked, &diagnostics);
+  SayText(stderr, diagnostics.Text());
+  LoadOptions options;
+  const auto file = FindModelOrRefuse(arguments.model);
+  if (diagnostics.has_errors() || !file || !ReadParameters(arguments.set, &options) ||
+      !ReadRobotOptions(arguments.options, &options)) {
+    return 2;
+  }
+  const auto folder = ResumeFolderOf(arguments, mechanism.name, inputs);
+  if (!folder) return 2;
+  const ParsedDocuments documents;
+  const ModelOfDesign model = [&](const VecX& values) {
+    LoadOptions with = options;
+    for (size_t k = 0; k < question.parameters.size(); ++k) {
+      with.overrides[question.parameters[k].name] = values[static_cast<Eigen::Index>(k)];
+    }
+    return LoadRobot(*file, with).mechanism;
+  };
+  const BestDesign design = FindBestDesign(question, model, asked, progress, folder.get());
+  line->Clear();
+  if (!design.summary.ok()) {
+    Say(stderr, "error: {}\n", design.verdict);
+    const Stop stop = design.summary.stop;
+    return stop == Stop::kUnsupported || stop == Stop::kUnreachable ? 2 : 3;
+  }
+  const std::string command = CommandOf(arguments, question, design.best);
+  std::FILE* to = arguments.json.text();
+  SayText(to, mechanism.name + "\n" +
+                  ToText(SectionOf(question, design, command),
+                         {.color = WantsColor(to), .columns = TerminalColumns(to)}));
+  nlohmann::ordered_json json = OutcomeJson(mechanism.name, design.agree, {});
+  json["best_design"] = ToJson(question, design);
+  return WriteResults(arguments, mechanism.name,
+                      DesignFiles(mechanism.name, question, design, command), design.agree, json,
+                      inputs);
 }
 
 // Of one pose: in how many ways its drives, or its coordinates, can be had; and type-2 curves over
@@ -203,6 +332,9 @@ int Workspace(const WorkspaceArguments& arguments) {
   if (line.active()) {
     progress = [&](const std::string& what, double fraction) { line.Show(what, fraction); };
   }
+  if (!arguments.maximise.empty() || !arguments.over_parameters.empty()) {
+    return BestOfDesigns(arguments, mechanism, progress, &line, inputs.files());
+  }
   if (!arguments.modes.empty() || arguments.joint_space) {
     return WaysToClose(arguments, mechanism, progress, &line, inputs.files());
   }
@@ -263,6 +395,20 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
                       "instead of a set: type-2 curves over the two drives of --over, the others "
                       "held, with their cusps");
   workspace
+      ->add_option("--maximise", arguments->maximise,
+                   "instead of a set: the design whose set is largest (length and area, too)")
+      ->check(CLI::IsMember({"volume"}));
+  list("--over-parameters", &arguments->over_parameters,
+       "NAME=LOW:HIGH (NAME_mm, NAME_deg): parameters of the model that a design chooses");
+  workspace->add_flag("--local", arguments->local,
+                      "designs only near the model's own; otherwise the whole box is searched");
+  workspace->add_option("--seed", arguments->seed, "of the search of designs")
+      ->capture_default_str();
+  workspace
+      ->add_option("--evaluations", arguments->evaluations,
+                   "designs at most (default: 100 for each parameter)")
+      ->check(CLI::Range(1, 1000000));
+  workspace
       ->add_option("--resolution", asked.flood.resolution,
                    "finest cells across the set; otherwise 400, 240 or 64 by its dimension")
       ->check(CLI::Range(8, 100000));
@@ -278,6 +424,8 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   SetFooter(workspace,
             {"workspace spr_tripod --set q_min=0.45 --set q_max=0.65",
              "workspace stewart --over x,y --at z=0.7 --range leg1=0.5:0.8",
+             "workspace friction_five_bar --over x,y --maximise volume --over-parameters "
+             "upper=0.2:0.3,base=0.1:0.4",
              "workspace my_robot.urdf --output foot --over roll,pitch"},
             "0 the ways to a measure agree, 1 they contradict each other, 2 bad input, 3 could not "
             "run");

@@ -456,23 +456,22 @@ TEST(Modes, AnAnkleHasThoseThatAreKnown) {
   EXPECT_EQ(FindModes(ankle, joint, VecX::Zero(2), {.threads = 2}).modes.size(), 4u);
 }
 
-// Sections of the joint space of the planar robot at ρ₁ = 14.98 [Zein, Wenger, Chablat 2008].
-constexpr double kRho1 = 14.98;
+// Sections of the joint space of the planar robot over ρ₁ [Zein, Wenger, Chablat 2008].
 
 // Of the platform's angle with all lengths: |p(α)|² Δ² = ρ₁² Δ², a trigonometric polynomial whose
 // roots are the ways to close; with its first three derivatives.
-std::array<double, 4> Characteristic(double rho2, double rho3, double alpha) {
+std::array<double, 4> Characteristic(double rho1, double rho2, double rho3, double alpha) {
   const double bx = (17.04 * 17.04 + 20.84 * 20.84 - 16.54 * 16.54) / (2 * 17.04);
   const Eigen::Vector2d b2(17.04, 0), b3(bx, std::sqrt(20.84 * 20.84 - bx * bx));
   const auto value = [&](double angle) {
     const Eigen::Rotation2Dd R(angle);
     const Eigen::Vector2d m = R * b2 - Eigen::Vector2d(15.91, 0),
                           n = R * b3 - Eigen::Vector2d(0, 10);
-    const double u = rho2 * rho2 - kRho1 * kRho1 - m.squaredNorm();
-    const double w = rho3 * rho3 - kRho1 * kRho1 - n.squaredNorm();
+    const double u = rho2 * rho2 - rho1 * rho1 - m.squaredNorm();
+    const double w = rho3 * rho3 - rho1 * rho1 - n.squaredNorm();
     const Eigen::Vector2d p(u * n[1] - w * m[1], -u * n[0] + w * m[0]);  // 2 Δ p
     const double delta = m[0] * n[1] - m[1] * n[0];
-    return p.squaredNorm() - 4 * kRho1 * kRho1 * delta * delta;
+    return p.squaredNorm() - 4 * rho1 * rho1 * delta * delta;
   };
   // By its Fourier coefficients, which end at 3.
   std::array<double, 4> derivatives{};
@@ -491,22 +490,24 @@ std::array<double, 4> Characteristic(double rho2, double rho3, double alpha) {
   return derivatives;
 }
 
-TEST(JointSpace, CuspsOfAPlanarRobotAreTripleRootsAndAllOfThem) {
-  MBV_NEEDS_PHC();
+// `start`: ρ₂ and ρ₃ that close.
+void ExpectAllCusps(double rho1, const Eigen::Vector2d& start, size_t curves) {
   const Mechanism robot = FromModelText(PlanarRobot());
   std::vector<NamedCoordinate> drives = DrivesOf(robot);
   std::rotate(drives.begin(), drives.begin() + 1, drives.end());
-  const JointSpaceCurves found = TraceJointSpace(robot, drives, Vec3(15.38, 12.0, kRho1), 2);
+  const JointSpaceCurves found = TraceJointSpace(robot, drives, Vec3(start[0], start[1], rho1), 2);
   ASSERT_TRUE(found.summary.ok()) << found.summary.message;
-  EXPECT_EQ(found.curves.size(), 4u);
+  if (curves > 0) {
+    EXPECT_EQ(found.curves.size(), curves);
+  }
   for (const Cusp& cusp : found.cusps) {
     const double rho2 = cusp.drives[1], rho3 = cusp.drives[2], alpha = cusp.outputs(0, 5);
-    const auto f = Characteristic(rho2, rho3, alpha);
+    const auto f = Characteristic(rho1, rho2, rho3, alpha);
     EXPECT_LT(std::abs(f[0]), 1e-9 * std::abs(f[3]));
     EXPECT_LT(std::abs(f[1]), 1e-9 * std::abs(f[3]));
     EXPECT_LT(std::abs(f[2]), 1e-9 * std::abs(f[3]));
     // A thousandth aside it is none.
-    const auto aside = Characteristic(rho2 * 1.001, rho3, alpha);
+    const auto aside = Characteristic(rho1, rho2 * 1.001, rho3, alpha);
     EXPECT_GT(std::abs(aside[0]) + std::abs(aside[1]), 1e-8 * std::abs(aside[3]));
   }
   // All cusps by polynomials: J's determinant vanishes, and its slope along the kernel.
@@ -535,13 +536,13 @@ TEST(JointSpace, CuspsOfAPlanarRobotAreTripleRootsAndAllOfThem) {
       D.By("x") * kernel[0] + D.By("y") * kernel[1] + (D.By("s") * c - D.By("c") * s) * kernel[2];
   size_t real = 0;
   for (const Solution& solution :
-       SolveByPhc({Square(x) + Square(y) - kRho1 * kRho1, Square(c) + Square(s) - 1.0, D, cusp})) {
+       SolveByPhc({Square(x) + Square(y) - rho1 * rho1, Square(c) + Square(s) - 1.0, D, cusp})) {
     if (!IsReal(solution)) continue;
     const double X = solution.at("x").real(), Y = solution.at("y").real();
     const double C = solution.at("c").real(), S = solution.at("s").real();
     const double rho2 = std::hypot(X + 17.04 * C - 15.91, Y + 17.04 * S);
     const double rho3 = std::hypot(X + bx * C - by * S, Y + bx * S + by * C - 10.0);
-    const auto f = Characteristic(rho2, rho3, std::atan2(S, C));
+    const auto f = Characteristic(rho1, rho2, rho3, std::atan2(S, C));
     const bool is_cusp = std::abs(f[0]) + std::abs(f[1]) + std::abs(f[2]) < 1e-6 * std::abs(f[3]);
     if (!is_cusp) continue;
     ++real;
@@ -554,6 +555,21 @@ TEST(JointSpace, CuspsOfAPlanarRobotAreTripleRootsAndAllOfThem) {
         << rho2 << " " << rho3;
   }
   EXPECT_EQ(found.cusps.size(), real);
+}
+
+TEST(JointSpace, CuspsOfAPlanarRobotAreTripleRootsAndAllOfThem) {
+  MBV_NEEDS_PHC();
+  ExpectAllCusps(14.98, {15.38, 12.0}, 4);
+  for (const double rho1 : {1.0, 2.0, 3.0, 5.0, 8.0, 17.0, 20.0, 30.0}) {
+    // Of a pose with that leg.
+    const double bx = (17.04 * 17.04 + 20.84 * 20.84 - 16.54 * 16.54) / (2 * 17.04);
+    const Eigen::Vector2d p = rho1 * Eigen::Vector2d(std::cos(0.6), std::sin(0.6));
+    const Eigen::Rotation2Dd R(0.3);
+    const Eigen::Vector2d b2 = p + R * Eigen::Vector2d(17.04, 0) - Eigen::Vector2d(15.91, 0);
+    const Eigen::Vector2d b3 =
+        p + R * Eigen::Vector2d(bx, std::sqrt(20.84 * 20.84 - bx * bx)) - Eigen::Vector2d(0, 10);
+    ExpectAllCusps(rho1, {b2.norm(), b3.norm()}, 0);
+  }
 }
 
 }  // namespace

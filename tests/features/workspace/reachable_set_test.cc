@@ -196,6 +196,45 @@ TEST(ReachableSet, AFiveBarsCirclesAndSingularCurvesAreThoseOfItsClosedForm) {
   EXPECT_GT(type2, 20u);
 }
 
+// The inner circles of both limbs cross: their boundaries are branches of one singularity.
+TEST(ReachableSet, HolesThatOverlapAreOne) {
+  for (const auto& [base, upper] :
+       {std::pair(0.17896087281166784, 0.22139718660000593), std::pair(0.15, 0.23)}) {
+    LoadOptions options;
+    options.overrides = {{"base", base}, {"upper", upper}};
+    LoadResult loaded = LoadModel(SourcePath("/models/friction_five_bar/model.yaml"), options);
+    ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    SetArguments arguments = Over({"x", "y"}, 120);
+    arguments.cross_singularities = true;
+    const auto lens = [d = base](double r) {
+      return 2 * r * r * std::acos(d / (2 * r)) - 0.5 * d * std::sqrt(4 * r * r - d * d);
+    };
+    const double hole = 0.35 - upper;
+    const Answer answer = Ask(*loaded.mechanism, arguments);
+    ExpectMeasure(answer, lens(0.35 + upper) - (2 * pi * hole * hole - lens(hole)), 1e-9);
+    EXPECT_EQ(answer.set.traced.sections[0].loops.size(), 2u);
+  }
+}
+
+// A hole so small that a step along its rim leaves it: it is taken off, not added.
+TEST(ReachableSet, SmallHolesAreTakenOff) {
+  for (const auto& [base, upper] :
+       {std::pair(0.20676558345885643, 0.29936310477781203), std::pair(0.2, 0.3)}) {
+    LoadOptions options;
+    options.overrides = {{"base", base}, {"upper", upper}};
+    LoadResult loaded = LoadModel(SourcePath("/models/friction_five_bar/model.yaml"), options);
+    ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    const Answer answer = Ask(*loaded.mechanism, Over({"x", "y"}, 60));
+    ASSERT_TRUE(answer.set.agree) << answer.set.verdict;
+    double outer = 0.0, inner = 0.0;
+    for (const TracedLoop& loop : answer.set.traced.sections[0].loops) {
+      (loop.area > 0.0 ? outer : inner) += loop.area;
+    }
+    EXPECT_GT(outer, 1.0);
+    EXPECT_LT(inner, -0.01);
+  }
+}
+
 // Three arms of two links hold a platform; home is turned so that nothing is symmetric.
 constexpr const char* k3Rrr = R"(
 name: planar_3rrr
@@ -561,10 +600,17 @@ motors:
     const auto expect = [&](const std::string& name, double value) {
       EXPECT_NEAR(map.values[k][index(name)], value, 1e-8 * (1 + std::abs(value))) << name;
     };
-    const Eigen::Matrix2d S = J.transpose() * J;
-    const double half = 0.5 * S.trace();
-    expect("type1_distance",
-           std::sqrt(half - std::sqrt(half * half - S.determinant())) / answer.set.length);
+    // V² = q̇ᵀ G q̇: the upper link by its middle, the other by the elbow, and both turns by L.
+    const double L2 = answer.set.length * answer.set.length;
+    Eigen::Matrix2d G;
+    G << a * a / 4 + a * a + 2 * L2, L2, L2, L2;
+    const auto least = [](const Eigen::Matrix2d& S) {
+      const double half = 0.5 * S.trace();
+      return std::sqrt(half - std::sqrt(half * half - S.determinant()));
+    };
+    const Eigen::Matrix2d per_speed = (0.5 * G).inverse();
+    expect("type1_distance", least(per_speed * J.transpose() * J));
+    expect("type2_distance", answer.set.length * least(per_speed));
     const Eigen::Matrix2d V = J * Eigen::Vector2d(3, 5).asDiagonal();
     expect("speed_most", std::max((V.col(0) + V.col(1)).norm(), (V.col(0) - V.col(1)).norm()));
     const double det = std::abs(V.determinant());
@@ -635,6 +681,111 @@ TEST(Quality, AnArmsStiffnessIsThatByHand) {
   }
 }
 
+// Between coupler and rocker, by the law of cosines at their joint.
+TEST(Quality, AFourBarsTransmissionAngleIsThatByHand) {
+  const Mechanism four_bar = ShippedModel("four_bar");
+  SetArguments arguments = Over({"A=1:2.2"}, 100);
+  arguments.output = "rocker";
+  const Answer answer = Ask(four_bar, arguments);
+  ASSERT_TRUE(answer.set.agree) << answer.diagnostics.Text() << answer.set.verdict;
+  const QualityMap map = MapQuality(*answer.question, answer.set, "rocker", 1);
+  EXPECT_TRUE(map.no_limb.empty());
+  const auto at = std::ranges::find(map.indices, "transmission_motor", &QualityIndex::name);
+  ASSERT_NE(at, map.indices.end());
+  for (size_t k = 0; k < map.points.size(); k += 3) {
+    const double theta = answer.set.flooded.lattice[map.points[k]].at[0];
+    const double x = 0.4 - 0.15 * std::cos(theta), y = 0.15 * std::sin(theta);
+    const double c = (0.35 * 0.35 + 0.3 * 0.3 - x * x - y * y) / (2 * 0.35 * 0.3);
+    EXPECT_NEAR(map.values[k][at - map.indices.begin()], std::acos(std::abs(c)) * 180 / pi, 1e-9);
+  }
+  // The coupler itself is no limb's end: crank and rocker both hold it by one joint alone.
+  const QualityMap coupler = MapQuality(*answer.question, answer.set, "coupler", 1);
+  const auto of_crank =
+      std::ranges::find(coupler.indices, "transmission_motor", &QualityIndex::name);
+  ASSERT_NE(of_crank, coupler.indices.end());
+  // The crank pushes its end across itself, along which that moves.
+  EXPECT_NEAR(coupler.values[0][of_crank - coupler.indices.begin()], 90.0, 1e-6);
+}
+
+// Legs along lines: the angle of each by the point's velocity while it alone moves.
+TEST(Quality, LegsTransmissionAnglesAreThoseOfTheirLines) {
+  for (const char* name : {"stewart_legs", "spr_tripod"}) {
+    const Mechanism robot = ShippedModel(name);
+    const Answer answer = Ask(robot, Over({"z"}, 40));
+    ASSERT_TRUE(answer.set.agree) << name << answer.diagnostics.Text() << answer.set.verdict;
+    const QualityMap map = MapQuality(*answer.question, answer.set, robot.outputs[0].name, 1);
+    EXPECT_TRUE(map.no_limb.empty()) << name;
+    PoseSpace space = PoseSpace(robot, answer.question->settings)
+                          .Section(static_cast<int>(answer.question->settings.coordinates.size()));
+    PlacedPose at;
+    ASSERT_TRUE(space.Home(&at));
+    ASSERT_FALSE(map.points.empty());
+    ASSERT_TRUE(space.Place(answer.set.flooded.lattice[map.points[0]].pose, &at));
+    const BodyStates states = space.States(at.pose);
+    const MatX T = space.Twists(at, states);
+    const int body = robot.outputs[0].body;
+    for (size_t d = 0; d < robot.drives.size(); ++d) {
+      const auto index = std::ranges::find(map.indices, "transmission_" + robot.drives[d].name,
+                                           &QualityIndex::name);
+      ASSERT_NE(index, map.indices.end()) << name;
+      // The stroke's rate is the point's speed along the leg, 1 here: sin μ = 1 / |v|.
+      const Joint* ball = nullptr;
+      for (const Joint& joint : robot.joints) {
+        const bool holds = joint.parent == body || joint.child == body;
+        if (holds && joint.name.starts_with(robot.drives[d].name)) ball = &joint;
+      }
+      if (ball == nullptr) continue;
+      const Vec3 p = (ball->parent == body ? ball->X_PF : ball->X_CM).translation();
+      MatX D(static_cast<Eigen::Index>(robot.drives.size()), T.cols());
+      for (Eigen::Index k = 0; k < D.rows(); ++k) {
+        const ScalarRow row =
+            CoordinateRow(robot, {Coordinate::Kind::kDrive, static_cast<int>(k), 0}, states);
+        D.row(k) = Eigen::RowVectorXd::Zero(T.cols());
+        if (row.parent > 0)
+          D.row(k) += row.J_parent.transpose() * T.middleRows(6 * (row.parent - 1), 6);
+        if (row.child > 0)
+          D.row(k) += row.J_child.transpose() * T.middleRows(6 * (row.child - 1), 6);
+      }
+      const Vec6 V =
+          T.middleRows(6 * (body - 1), 6) * D.inverse().col(static_cast<Eigen::Index>(d));
+      const Vec3 arm = states.X_WB[static_cast<size_t>(body)].linear() * p;
+      const double speed = (V.tail<3>() + Vec3(V.head<3>()).cross(arm)).norm();
+      EXPECT_NEAR(map.values[0][index - map.indices.begin()], std::asin(1 / speed) * 180 / pi, 1e-7)
+          << name << " " << robot.drives[d].name;
+    }
+  }
+}
+
+// A beam on a servo that turns: 1/k = l³/3EI + l²/k_servo across, l/EA along.
+TEST(Quality, AnElasticArmsStiffnessIsThatOfBeamAndServo) {
+  const Mechanism arm = FromText(R"(
+name: elastic
+gravity: [0, 0, 0]
+sections:
+  s: {general: {area: 3.141592653589793e-4, I_y: 7.853981633974483e-9, I_z: 7.853981633974483e-9, torsion: 1.6e-8}}
+materials:
+  m: {youngs_modulus: 2.0e11, shear_modulus: 8.0e10}
+bodies:
+  arm: {mass: 1, com: [0.2, 0, 0], inertia: [0.01, 0.01, 0.01], frames: {tip: [0.4, 0, 0]}, beams: {b: {to: tip, section: s, material: m, z: z}}}
+joints:
+  q: {kind: revolute, parent: world, child: arm, axis: z, range: [-1, 1]}
+drives:
+  q: {kind: joint, joint: q, stiffness: 5000}
+outputs: {tip: arm.tip}
+)");
+  const Answer answer = Ask(arm, Over({"q"}, 40));
+  const QualityMap map = MapQuality(*answer.question, answer.set, "tip", 1);
+  const double EI = 2e11 * pi * std::pow(0.02, 4) / 64, EA = 2e11 * pi * 1e-4, l = 0.4;
+  const auto value = [&](const char* name) {
+    const auto at = std::ranges::find(map.indices, name, &QualityIndex::name);
+    return map.values[0][at - map.indices.begin()];
+  };
+  const double soft = 1 / (l * l * l / (3 * EI) + l * l / 5000);
+  EXPECT_NEAR(value("stiffness_least"), soft, 1e-6 * soft);
+  EXPECT_NEAR(value("stiffness_most"), EA / l, 1e-6 * EA / l);
+  EXPECT_GT(std::abs(5000 / (l * l) - soft), 1e-2 * soft);  // the servo alone would show
+}
+
 // A table on two slides, with a strut from its corner as a third drive: all is known by the strut's
 // direction u. Rates D = (1, 0), (0, 1), u; the table's twist is the slides'.
 TEST(Quality, RedundantDrivesIndicesAreThoseByHand) {
@@ -680,7 +831,17 @@ outputs: {table: table}
     // DᵀD = 1 + u uᵀ: its eigenvalues are 2 and 1.
     EXPECT_NEAR(value("condition"), std::sqrt(2.0), 1e-9);
     EXPECT_NEAR(value("manipulability"), 1 / std::sqrt(2.0), 1e-9);
-    EXPECT_NEAR(value("type2_distance"), 1.0, 1e-9);
+    // V² = x² + ½ y².
+    const Eigen::Matrix2d rates =
+        Eigen::Vector2d(1, 2).asDiagonal() * (Eigen::Matrix2d::Identity() + u * u.transpose());
+    const double half = 0.5 * rates.trace();
+    EXPECT_NEAR(value("type2_distance"),
+                std::sqrt(half - std::sqrt(half * half - rates.determinant())), 1e-9);
+    EXPECT_NEAR(value("type1_distance"), 1.0, 1e-9);
+    // 1 / (D M⁻¹ Dᵀ): bridge and table along x, the table alone along y.
+    EXPECT_NEAR(value("mass_x"), 5.0, 1e-9);
+    EXPECT_NEAR(value("mass_y"), 2.0, 1e-9);
+    EXPECT_NEAR(value("mass_strut"), 1 / (u[0] * u[0] / 5 + u[1] * u[1] / 2), 1e-9);
     // All directions by brute force: what the drives allow, and what they hold.
     double slow = 1e9, fast = 0.0, weak = 1e9, strong = 0.0;
     constexpr int n = 3600;
