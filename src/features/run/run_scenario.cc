@@ -287,7 +287,8 @@ class ScenarioRun {
     const bool in_phases = phases.front().scenario.phase.has_value();
     if (in_phases && options_.after_judgement) {
       outcome_.diagnostics.AddError(
-          file_, "phases: --certify and --derivatives are of one mechanism, and each phase is another",
+          file_,
+          "phases: --certify and --derivatives are of one mechanism, and each phase is another",
           "one phase alone: a scenario with contacts: […]");
       return BadInput();
     }

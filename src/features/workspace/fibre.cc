@@ -369,7 +369,8 @@ class RangeTracer {
     } else {
       traced = TraceFrom(own, seeds);
     }
-    traced.closings += own.closings() - before;
+    // The tracer went on from what `own` had counted.
+    traced.closings = (seeds.empty() ? own.closings() : traced.closings) - before;
     return traced;
   }
 
