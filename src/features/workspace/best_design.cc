@@ -48,9 +48,9 @@ VecX SharesOf(const DesignQuestion& question, const VecX& values) {
 }
 
 // One way to the set of a design.
-Design MeasureDesign(const ModelOfDesign& model, const VecX& values, const SetArguments& arguments,
-                     bool by_lattice) {
-  Design design{.at = values, .measure = 0.0, .error = 0.0, .why = {}};
+TriedDesign MeasureDesign(const ModelOfDesign& model, const VecX& values,
+                          const SetArguments& arguments, bool by_lattice) {
+  TriedDesign design{.at = values, .measure = 0.0, .error = 0.0, .why = {}};
   const auto mechanism = model(values);
   if (!mechanism) {
     design.why = "the model cannot be built";
@@ -133,15 +133,15 @@ class Search {
  private:
   double Try(const VecX& share) {
     const VecX values = ValuesOf(question_, share);
-    const auto leads = [&](const Design& design) {
+    const auto leads = [&](const TriedDesign& design) {
       const bool first = tried_.empty() || !tried_[best_].why.empty();
       return design.why.empty() && (first || design.measure > tried_[best_].measure);
     };
-    Design last = log_.Get<Design>([&] {
-      Design design = MeasureDesign(model_, values, arguments_, false);
+    TriedDesign last = log_.Get<TriedDesign>([&] {
+      TriedDesign design = MeasureDesign(model_, values, arguments_, false);
       if (!leads(design)) return design;
       // A boundary that is wrong does not lead the search.
-      const Design other = MeasureDesign(
+      const TriedDesign other = MeasureDesign(
           model_, values, CoarseOf(arguments_, static_cast<int>(arguments_.over.size())), true);
       if (std::abs(other.measure - design.measure) > other.error + design.error) {
         design.why = other.why.empty()
@@ -188,7 +188,7 @@ class Search {
   const ProgressFunction& progress_;
   ResultLog log_;
   const int most_;
-  std::vector<Design> tried_;
+  std::vector<TriedDesign> tried_;
   size_t best_ = 0;
 };
 
@@ -236,11 +236,11 @@ std::string ValueText(double value, const std::string& unit) {
 }
 
 // Larger than the best one by more than both errors.
-bool IsLarger(const Design& design, const FloodedSet& best) {
+bool IsLarger(const TriedDesign& design, const FloodedSet& best) {
   return design.why.empty() && design.measure - best.measure > design.error + best.error;
 }
 // Smaller by more than that.
-bool IsSmaller(const Design& design, const FloodedSet& best) {
+bool IsSmaller(const TriedDesign& design, const FloodedSet& best) {
   return !design.why.empty() || best.measure - design.measure > design.error + best.error;
 }
 
@@ -309,12 +309,12 @@ void VerifyBestDesign(const DesignQuestion& question, const ModelOfDesign& model
   }
   ResultLog log = folder == nullptr ? ResultLog() : folder->Log("verified");
   const SetArguments coarse = CoarseOf(arguments, asked->settings.over);
-  const auto measure = [&](const std::vector<VecX>& shares, std::vector<Design>* designs) {
+  const auto measure = [&](const std::vector<VecX>& shares, std::vector<TriedDesign>* designs) {
     designs->clear();
     for (const VecX& share : shares) {
       const VecX values = ValuesOf(question, share);
       designs->push_back(
-          log.Get<Design>([&] { return MeasureDesign(model, values, coarse, true); }));
+          log.Get<TriedDesign>([&] { return MeasureDesign(model, values, coarse, true); }));
       if (progress) {
         progress("designs by the lattice",
                  static_cast<double>(designs->size()) / static_cast<double>(shares.size()));
@@ -333,9 +333,9 @@ void VerifyBestDesign(const DesignQuestion& question, const ModelOfDesign& model
   measure(shares, &result->elsewhere);
 
   const FloodedSet& flooded = result->set.flooded;
-  const Design* larger = nullptr;
+  const TriedDesign* larger = nullptr;
   for (const auto* list : {&result->beside, &result->elsewhere}) {
-    for (const Design& design : *list) {
+    for (const TriedDesign& design : *list) {
       if (IsLarger(design, flooded) && (larger == nullptr || design.measure > larger->measure)) {
         larger = &design;
       }
@@ -361,7 +361,7 @@ void VerifyBestDesign(const DesignQuestion& question, const ModelOfDesign& model
                                   larger->measure, larger->error, result->set.unit);
   } else {
     const auto smaller = std::ranges::count_if(
-        result->beside, [&](const Design& design) { return IsSmaller(design, flooded); });
+        result->beside, [&](const TriedDesign& design) { return IsSmaller(design, flooded); });
     result->verdict = fmt::format(
         "the lattice confirms the {}, and finds none of {} designs beside it and {} elsewhere "
         "larger; of those beside it {} are smaller by more than the errors, the others as large "
@@ -388,7 +388,8 @@ BestDesign FindBestDesign(const DesignQuestion& question, const ModelOfDesign& m
 ReportSection SectionOf(const DesignQuestion& question, const BestDesign& design,
                         const std::string& command) {
   const ReachableSet& set = design.set;
-  ReportSection section{.title = "Design of the largest " + set.measure, .link = "Design"};
+  ReportSection section{.title = "TriedDesign of the largest " + set.measure,
+                        .link = "TriedDesign"};
   section.Add(Paragraph{(design.agree ? "AGREE: " : "DISAGREE: ") + design.verdict,
                         design.agree ? Paragraph::Look::kPlain : Paragraph::Look::kReason});
   Table values{.name = "design_values",
@@ -406,7 +407,7 @@ ReportSection SectionOf(const DesignQuestion& question, const BestDesign& design
                                               : ""});
   }
   section.Add(std::move(values));
-  const Design& own = design.tried.front();
+  const TriedDesign& own = design.tried.front();
   Table measures{.name = "design_measures",
                  .caption = fmt::format("The {} [{}]", set.measure, set.unit),
                  .columns = {Text("design"), Digits("by the boundary"), Digits("by the lattice")}};
@@ -417,22 +418,23 @@ ReportSection SectionOf(const DesignQuestion& question, const BestDesign& design
                            fmt::format("{:.6g} ± {:.0e}", set.flooded.measure, set.flooded.error)});
   for (const auto& [name, list] :
        {std::pair("largest beside it", &design.beside), {"largest elsewhere", &design.elsewhere}}) {
-    const auto most = std::ranges::max_element(*list, {}, &Design::measure);
+    const auto most = std::ranges::max_element(*list, {}, &TriedDesign::measure);
     if (most == list->end()) continue;
     measures.rows.push_back({name, "", fmt::format("{:.6g} ± {:.0e}", most->measure, most->error)});
   }
   section.Add(std::move(measures));
-  const auto none =
-      std::ranges::count_if(design.tried, [](const Design& tried) { return !tried.why.empty(); });
+  const auto none = std::ranges::count_if(
+      design.tried, [](const TriedDesign& tried) { return !tried.why.empty(); });
   section.Note(
       fmt::format("{} designs by the boundary (seed {}, {}){}", design.tried.size(), question.seed,
                   question.global ? "controlled random search, then Nelder and Mead's "
                                     "method in subspaces"
                                   : "Nelder and Mead's method in subspaces",
                   none > 0 ? fmt::format("; {} of them have no set, the first one since {}", none,
-                                         std::ranges::find_if(
-                                             design.tried,
-                                             [](const Design& tried) { return !tried.why.empty(); })
+                                         std::ranges::find_if(design.tried,
+                                                              [](const TriedDesign& tried) {
+                                                                return !tried.why.empty();
+                                                              })
                                              ->why)
                            : ""),
       On::kAll);
@@ -452,7 +454,8 @@ ReportSection SectionOf(const DesignQuestion& question, const BestDesign& design
   section.Add(Drawing{ToSvg(plot)}, On::kPage);
   if (question.parameters.size() == 1) {
     PlotLine along{.label = set.measure, .points = {}};
-    for (const Design& tried : design.tried) along.points.emplace_back(tried.at[0], tried.measure);
+    for (const TriedDesign& tried : design.tried)
+      along.points.emplace_back(tried.at[0], tried.measure);
     std::ranges::sort(along.points);
     const DesignParameter& p = question.parameters[0];
     section.Add(Drawing{ToSvg(LinePlot{.title = "over the parameter",
@@ -499,8 +502,8 @@ std::vector<std::pair<std::string, std::string>> DesignFiles(const std::string& 
   auto out = std::back_inserter(csv);
   for (const DesignParameter& p : question.parameters) csv += "," + CsvCell(p.name);
   csv += ",measure,error,why_none\n";
-  const auto rows = [&](const char* way, const std::vector<Design>& designs) {
-    for (const Design& d : designs) {
+  const auto rows = [&](const char* way, const std::vector<TriedDesign>& designs) {
+    for (const TriedDesign& d : designs) {
       csv += way;
       for (const double value : d.at) fmt::format_to(out, ",{:.17g}", value);
       fmt::format_to(out, ",{:.17g},{:.3g},{}\n", d.measure, d.error, CsvCell(d.why));

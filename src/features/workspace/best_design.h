@@ -36,24 +36,24 @@ struct DesignQuestion {
   unsigned long seed = 1;
 };
 
-struct Design {
+struct TriedDesign {
   VecX at;  ///< values of the parameters, SI
   double measure = 0.0, error = 0.0;
   std::string why;  ///< it has no set
 };
 /// See math/bytes.h.
 template <typename Visit>
-void VisitMembers(Visit& visit, typename Visit::template Of<Design>& design) {
+void VisitMembers(Visit& visit, typename Visit::template Of<TriedDesign>& design) {
   visit(design.at), visit(design.measure), visit(design.error), visit(design.why);
 }
 
 struct BestDesign {
   RunSummary summary;
-  std::vector<Design> tried;      ///< by the boundary, in this order
-  Design best;                    ///< of them
-  ReachableSet set;               ///< of it, both ways
-  std::vector<Design> beside;     ///< by the lattice, near it
-  std::vector<Design> elsewhere;  ///< by the lattice, all over the box
+  std::vector<TriedDesign> tried;      ///< by the boundary, in this order
+  TriedDesign best;                    ///< of them
+  ReachableSet set;                    ///< of it, both ways
+  std::vector<TriedDesign> beside;     ///< by the lattice, near it
+  std::vector<TriedDesign> elsewhere;  ///< by the lattice, all over the box
   bool agree = false;
   std::string verdict;
 };

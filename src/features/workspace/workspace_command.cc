@@ -192,7 +192,7 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
 
 // "mbverify workspace arm --over x,y --set a=0.35": the set of a design.
 std::string CommandOf(const WorkspaceArguments& arguments, const DesignQuestion& question,
-                      const Design& design) {
+                      const TriedDesign& design) {
   const SetArguments& asked = arguments.set_of_poses;
   std::string command = "mbverify workspace " + arguments.model;
   const auto add = [&](const char* option, const std::vector<std::string>& texts) {

@@ -194,7 +194,7 @@ TEST(BestDesign, ItsCommandIsReadAndRefused) {
   EXPECT_THAT(result.out, HasSubstr("\"best_design\""));
   const auto folder = std::filesystem::path(mbverify.Out()) / "friction_five_bar/workspace";
   EXPECT_THAT(ReadAll(folder / "designs.csv"), HasSubstr("way,upper,measure,error,why_none"));
-  EXPECT_THAT(ReadAll(folder / "best_design.html"), HasSubstr("Design of the largest length"));
+  EXPECT_THAT(ReadAll(folder / "best_design.html"), HasSubstr("TriedDesign of the largest length"));
 }
 
 }  // namespace
