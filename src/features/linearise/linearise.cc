@@ -15,6 +15,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "kinematics/command_rank.h"
+#include "kinematics/constraints.h"
 #include "math/ridders.h"
 #include "mechanism/reach.h"
 #include "simulation/engine/engine_derivatives.h"
@@ -32,6 +33,7 @@ constexpr double kShown = 0.05;       // of the characteristic length or of a ra
 constexpr int kMostSteps = 50;        // towards an equilibrium
 constexpr double kBalanced = 1e-12;   // of the largest force
 constexpr double kLeastShare = 1e-6;  // of weights: a scale where no force is
+constexpr double kOfDistance = 0.2;   // of the smallest singular value
 constexpr double kFirstStep = 0.01;   // of differences, in units of lengths and angles
 
 }  // namespace
@@ -204,6 +206,9 @@ class Lineariser {
   // Newton's method on J_dᵀ τ = f(q, 0, 0), steps halved until less is out of balance.
   bool Settle(VecX* f) {
     if (!v_.isZero(0.0)) return Refuse("--equilibrium: rates are stated", "an equilibrium rests");
+    if (stiffness_.size() > 0) {
+      return Refuse("--equilibrium: servos hold the state that is stated", "without --servos");
+    }
     if (!forces_given_) return true;  // the drives hold whatever is asked
     // Of what is out of balance.
     const auto open = [&] {
@@ -296,22 +301,45 @@ class Lineariser {
     VecX q = out_.q, v = out_.v, a = out_.a;
     ForceDerivatives& by = out_.by_differences;
     const double speed = std::max(1.0, v.cwiseQuotient(unit_).cwiseAbs().maxCoeff());
+    // Where loops are nearly singular forces change within that distance.
+    const double near = std::min(kFirstStep, kOfDistance * out_.control);
     for (const auto& [of, matrix, step] :
-         {std::tuple(&q, &by.by_position, kFirstStep), std::tuple(&v, &by.by_velocity, 0.1 * speed),
+         {std::tuple(&q, &by.by_position, near), std::tuple(&v, &by.by_velocity, 0.1 * speed),
           std::tuple(&a, &by.by_acceleration, speed * speed)}) {
       matrix->resize(n_, n_);
       for (Eigen::Index k = 0; k < n_; ++k) {
         const double at = (*of)[k];
+        double most = step * unit_[k];
+        if (of == &v) {
+          (void)ForceAt(q, v, a);  // the state itself
+          most = SlidingStep(k, most);
+        }
         matrix->col(k) = SlopesAt(
             [&, of = of](double x) {
               (*of)[k] = x;
               return ForceAt(q, v, a);
             },
-            at, step * unit_[k]);
+            at, most);
         (*of)[k] = at;
       }
     }
     (void)ForceAt(q, v, a);
+  }
+  // At most `step` of a rate: what slides with dry friction keeps its direction.
+  [[nodiscard]] double SlidingStep(Eigen::Index k, double step) const {
+    constexpr double kShare = 0.3;
+    const BodyStates& states = model_->states();
+    std::vector<Vec6> along(states.X_WB.size(), Vec6::Zero());
+    for (size_t b = 1; b < along.size(); ++b) {
+      along[b] = T_.block<6, 1>(6 * (static_cast<Eigen::Index>(b) - 1), k);
+    }
+    for (size_t e = 0; e < mechanism_.elements.size(); ++e) {
+      if (!HasFriction(mechanism_.elements[e])) continue;
+      const ScalarRow row = ElementRow(mechanism_, e, states);
+      const double share = std::abs(RateOf(row, along));
+      if (share > 0.0) step = std::min(step, kShare * std::abs(RateOf(row, states.V_WB)) / share);
+    }
+    return step;
   }
   VecX ForceAt(const VecX& q, const VecX& v, const VecX& a) {
     MatX T;

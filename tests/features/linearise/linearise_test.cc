@@ -233,6 +233,15 @@ springs:
   EXPECT_GT(loop.engines[1].position_error, 1e-7);
 }
 
+// Friction that slides slowly keeps its direction in differences, too.
+TEST(Linearise, DifferentiatesSlidingFriction) {
+  LinearSettings settings;
+  settings.rates = {{"motor1", 0.05}, {"motor2", -0.03}};
+  const Linearisation result = Linearise(Model("friction_five_bar"), settings);
+  ASSERT_FALSE(result.diagnostics.has_errors()) << result.diagnostics.Text();
+  EXPECT_TRUE(result.agrees()) << result.difference_error;
+}
+
 TEST(Linearise, RefusesWhatHasNoDerivative) {
   const Linearisation result = Linearise(Model("journal_crank"), LinearSettings());
   ASSERT_TRUE(result.diagnostics.has_errors());
