@@ -42,22 +42,20 @@ void CheckSlopes(const Mechanism& mechanism, unsigned seed, SlopeErrors* worst) 
   ASSERT_TRUE(summary.ok()) << mechanism.name << ": " << summary.message;
   MatX position(n, n), velocity(n, n), acceleration(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const auto slope = [&](VecX* of, double step) {
-        const double at = (*of)[k];
-        const double found = SlopeAt(
-            [&](double x) {
-              (*of)[k] = x;
-              return subject.Forces(q, v, a)[i];
-            },
-            at, step);
-        (*of)[k] = at;
-        return found;
-      };
-      position(i, k) = slope(&q, 0.5 * subject.share * unit[k]);
-      velocity(i, k) = slope(&v, 0.1 * std::abs(v[k]));  // friction keeps its direction
-      acceleration(i, k) = slope(&a, unit[k]);
-    }
+    const auto slopes = [&](VecX* of, double step) {
+      const double at = (*of)[k];
+      const VecX found = SlopesAt(
+          [&](double x) {
+            (*of)[k] = x;
+            return subject.Forces(q, v, a);
+          },
+          at, step);
+      (*of)[k] = at;
+      return found;
+    };
+    position.col(k) = slopes(&q, 0.5 * subject.share * unit[k]);
+    velocity.col(k) = slopes(&v, 0.1 * std::abs(v[k]));  // friction keeps its direction
+    acceleration.col(k) = slopes(&a, unit[k]);
   }
   const MatX scale = MatX(unit.asDiagonal());  // forces and coordinates in units of their own
   const auto off = [&](const MatX& x, const MatX& y) {
