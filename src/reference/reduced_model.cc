@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <limits>
 #include <optional>
 
@@ -218,19 +217,13 @@ RunSummary ReducedModel::Derivatives(const MatX& T, const std::vector<LoadSample
   return impl_->variations->Differentiate(&*impl_->closure, T, loads, signs, terms, out);
 }
 
-namespace {
-
-// ∂(J_dᵀ τ)/∂q, a column per coordinate.
-MatX VariedRates(const ForceDerivatives& of, const VecX& drive_forces) {
-  const Eigen::Index n = of.by_position.cols();
-  MatX varied(n, n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    varied.col(k) = of.drive_rate_slopes[static_cast<size_t>(k)].transpose() * drive_forces;
+MatX StiffnessOf(const ForceDerivatives& of, const VecX& drive_forces) {
+  MatX K = of.by_position;
+  for (Eigen::Index k = 0; k < K.cols(); ++k) {
+    K.col(k) -= of.drive_rate_slopes[static_cast<size_t>(k)].transpose() * drive_forces;
   }
-  return varied;
+  return K;
 }
-
-}  // namespace
 
 bool MakeMotionDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
                            MotionDerivatives* out) {
@@ -242,20 +235,9 @@ bool MakeMotionDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
   const auto divided = [&](const MatX& by) {
     return MatX(scale.asDiagonal() * mass.solve(scale.asDiagonal() * by));
   };
-  out->by_position = divided(VariedRates(of, drive_forces) - of.by_position);
+  out->by_position = divided(-StiffnessOf(of, drive_forces));
   out->by_velocity = divided(-of.by_velocity);
   out->by_force = divided(of.drive_rates.transpose());
-  return true;
-}
-
-bool MakeDriveForceDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
-                               DriveForceDerivatives* out) {
-  if (of.drive_rates.rows() != of.drive_rates.cols()) return false;
-  const Eigen::PartialPivLU<MatX> rates(of.drive_rates.transpose());
-  if (of.drive_rates.size() > 0 && !(rates.rcond() > kLeastMass)) return false;
-  out->by_position = rates.solve(of.by_position - VariedRates(of, drive_forces));
-  out->by_velocity = rates.solve(of.by_velocity);
-  out->by_acceleration = rates.solve(of.by_acceleration);
   return true;
 }
 

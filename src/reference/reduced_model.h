@@ -46,13 +46,8 @@ struct MotionDerivatives {
 /// By (3): M ∂a = ∂(J_dᵀ τ) − ∂f. False where M is singular.
 [[nodiscard]] bool MakeMotionDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
                                          MotionDerivatives* out);
-/// Of τ(q, v, a) where drives are as many as coordinates: J_dᵀ ∂τ = ∂f − ∂(J_dᵀ) τ, drives × n
-/// each. False where they do not determine the motion.
-struct DriveForceDerivatives {
-  MatX by_position, by_velocity, by_acceleration;
-};
-[[nodiscard]] bool MakeDriveForceDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
-                                             DriveForceDerivatives* out);
+/// ∂f/∂q less what constant drive forces change with the pose, ∂(J_dᵀ τ)/∂q.
+[[nodiscard]] MatX StiffnessOf(const ForceDerivatives& of, const VecX& drive_forces);
 
 class ReducedModel {
  public:

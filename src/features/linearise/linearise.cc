@@ -252,10 +252,7 @@ class Lineariser {
 
   // ∂f/∂q less what the drives' forces change.
   [[nodiscard]] MatX StiffnessOf(const ForceDerivatives& slopes) const {
-    MatX K = slopes.by_position;
-    for (Eigen::Index k = 0; k < n_; ++k) {
-      K.col(k) -= slopes.drive_rate_slopes[static_cast<size_t>(k)].transpose() * out_.drive_force;
-    }
+    MatX K = mbv::StiffnessOf(slopes, out_.drive_force);
     if (stiffness_.size() > 0) {
       K += slopes.drive_rates.transpose() * stiffness_.asDiagonal() * slopes.drive_rates;
     }
