@@ -4,6 +4,7 @@
 
 #include "cli/cli.h"
 #include "equations/equations.h"
+#include "features/benchmark/benchmark.h"
 #include "features/run/run_scenario.h"
 #include "features/stiffness/stiffness.h"
 #include "features/study/study.h"
@@ -17,7 +18,7 @@ AddCommand AddInitCommand, AddRunCommand, AddRenderCommand, AddModelCommand, Add
     AddCrosscheckCommand, AddSurveyCommand, AddInertiaCommand, AddSizeCommand, AddFiguresCommand,
     AddTablesCommand, AddStudyCommand, AddPackageCommand, AddSensitivityCommand, AddRegressCommand,
     AddMergeCommand, AddHistoryCommand, AddLogCommand, AddStandinCommand, AddCodeCommand,
-    AddLineariseCommand, AddSheetCommand;
+    AddLineariseCommand, AddSheetCommand, AddBenchmarkCommand;
 
 namespace {
 
@@ -51,6 +52,7 @@ constexpr std::array kCommands = {
     CommandRow{AddStandinCommand, kRobots, true},
     CommandRow{AddCodeCommand, kRobots},
     CommandRow{AddCrosscheckCommand, kEngines},
+    CommandRow{AddBenchmarkCommand, kEngines},
     CommandRow{AddRenderCommand, kPublish, true},
     CommandRow{AddFiguresCommand, kPublish},
     CommandRow{AddTablesCommand, kPublish},
@@ -80,6 +82,9 @@ std::optional<Mechanism> StiffnessMechanism(const std::string& file, const Scena
 bool IsStudy(const std::string& /*file*/, const ScenarioHead& head) {
   return !head.is_scenario && head.HasKey("study");
 }
+bool IsBenchmark(const std::string& /*file*/, const ScenarioHead& head) {
+  return !head.is_scenario && head.HasKey("benchmark");
+}
 bool IsStiffness(const std::string& /*file*/, const ScenarioHead& head) {
   return head.is_scenario && head.kind == "stiffness";
 }
@@ -103,6 +108,7 @@ bool IsAny(const std::string& /*file*/, const ScenarioHead& /*head*/) { return t
 constexpr std::array kDocuments = {
     DocumentKind{.name = "mechanism", .is = IsMechanismJson, .check = CheckMechanismFile},
     DocumentKind{.name = "study", .is = IsStudy, .check = CheckStudy, .command = "study"},
+    DocumentKind{.name = "benchmark", .is = IsBenchmark, .check = CheckBenchmarkCase},
     DocumentKind{.name = "stiffness",
                  .is = IsStiffness,
                  .check = CheckStiffness,

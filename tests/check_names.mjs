@@ -1,7 +1,8 @@
 // Sources are compiled several at a time (CMake's unity build): names in unnamed namespaces must
 // differ within each library of src/ and tests/, and so must tests; none is a type of a
 // header that one of the files includes, and no file opens a namespace for those compiled after it
-// (but within a namespace of its room, which all its files share).
+// (but within a namespace of its room, which all its files share). Types that headers declare differ
+// in the whole program.
 //   node check_names.mjs ROOT
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -74,8 +75,9 @@ function clash(one, other) {
   return !alias && !overload;
 }
 
-// Types that headers declare: "mbv::Load" → header.
-function typesIn(headers) {
+// Types that headers declare: "mbv::Load" → header. One that another header declares, too, goes to
+// `twice`: whatever the rooms, the linker takes one of both for all.
+function typesIn(headers, twice = []) {
   const types = {};
   for (const [path, text] of Object.entries(headers)) {
     let outer = '';
@@ -83,7 +85,10 @@ function typesIn(headers) {
       const open = /^namespace ([\w:]+) \{$/.exec(line);
       if (open) outer = open[1];
       const type = /^(?:struct|class|enum(?: class)?) (\w+)\b[^;]*\{/.exec(line);
-      if (type) types[`${outer}::${type[1]}`] = path;
+      if (!type) continue;
+      const name = `${outer}::${type[1]}`;
+      if (name in types && types[name] !== path) twice.push(`${name} is a type of ${types[name]} and of ${path}`);
+      types[name] = path;
     }
   }
   return types;
@@ -112,7 +117,7 @@ function reachedHeaders(sources, headers) {
 function check(sources, headers = {}) {
   const places = {};  // folder and name → declarations
   const found = [];
-  const types = typesIn(headers);
+  const types = typesIn(headers, found);
   const reached = reachedHeaders(sources, headers);
   for (const [path, text] of Object.entries(sources)) {
     const folder = libraryOf(path);
@@ -151,6 +156,9 @@ function selfTest() {
   const other = { 'src/a/z.cc': '#include "b/y.h"\n' };
   if (check({ 'src/a/x.cc': file('int Load(int x) {'), ...other }, header).length !== 1) return 'a type of a header';
   if (check({ 'src/a/x.cc': file('int Load(int x) {') }, header).length !== 0) return 'a type without includers';
+  const twice = { 'src/a/x.h': 'namespace mbv {\nstruct Load {\n};\n', ...header };
+  if (check({}, twice).join() !== 'mbv::Load is a type of src/a/x.h and of src/b/y.h') return 'a type in two headers';
+  if (check({}, { 'src/a/x.h': 'namespace mbv::a {\nstruct Load {\n};\n', ...header }).length !== 0) return 'a type in two namespaces';
   const same = file('int Once() {');
   if (check({ 'src/a/x.cc': same, 'src/b/x.cc': same }).length !== 0) return 'one name in two layers';
   if (both('struct Row;\nusing internal::Row;\nusing Json = nlohmann::json;', 'int Shared(int x);').length !== 0) return 'declarations that may occur twice';

@@ -23,7 +23,7 @@ struct WitnessAnswer {
   std::string method;   ///< what computes, one sentence; may be empty
   std::string refused;  ///< why it does not compute this case; "" if it does
   std::vector<std::pair<std::string, std::string>> declined = {};  ///< what it leaves out, and why
-  double compute_s = kNan;  ///< wall time of its computation alone, by itself; NaN: not stated
+  double compute_s = kNan;  ///< processor time of its computation alone; NaN: not stated
 };
 
 /// Empty, with one sentence of trouble, for what is no such file.

@@ -49,6 +49,7 @@ constexpr Call kCalls[] = {
     {"sheet four_bar/turn_inverse --out OUT/x", 0},
     {"crosscheck four_bar/turn", 0},
     {"crosscheck --newest four_bar/turn", 0},
+    {"benchmark benchmark/damped_pendulum --engine reference --out OUT/x", 0},
     {"workspace spr_tripod --no-pictures --out OUT/x", 0},
     {"workspace four_bar --out OUT/x", 0},
     {"workspace four_bar --modes all --out OUT/x", 0},

@@ -4,8 +4,8 @@
 #include <Simbody.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -51,19 +51,21 @@ struct Sample {
   double position = 0.0, velocity = 0.0, acceleration = 0.0;
 };
 
-// Reports how long it lived.
+// Reports the processor time that passed while it lived.
 class Stopwatch {
  public:
   explicit Stopwatch(double* seconds) : seconds_(*seconds) {}
-  ~Stopwatch() {
-    seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
+  ~Stopwatch() { seconds_ = ProcessorTime() - start_; }
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
  private:
+  static double ProcessorTime() {
+    return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
+  }
+
   double& seconds_;
-  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  const double start_ = ProcessorTime();
 };
 
 struct Table {

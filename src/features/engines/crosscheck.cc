@@ -118,7 +118,32 @@ Table RowTable(const Rows& rows, const std::string& scenario) {
   return table;
 }
 
+// A word that names a file here names it anywhere: the program runs in another folder.
+std::string Placed(const std::string& word) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(word, error)) return word;
+  return std::filesystem::absolute(word).string();
+}
+
 }  // namespace
+
+std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines) {
+  std::string text;
+  for (const std::string& engine : engines) {
+    const auto named = SplitSet(engine);
+    if (!named) return {};
+    std::string words;
+    for (size_t at = 0; at < named->second.size();) {
+      const size_t end = std::min(named->second.find(' ', at), named->second.size());
+      if (end > at)
+        words += fmt::format("{}\"{}\"", words.empty() ? "" : ", ",
+                             Placed(named->second.substr(at, end - at)));
+      at = end + 1;
+    }
+    text += fmt::format("{}{}: {{command: [{}]}}", text.empty() ? "" : ", ", named->first, words);
+  }
+  return SetValue{"witnesses", "{" + text + "}"};
+}
 
 Rows CrosscheckRows(const Report& report) {
   Rows rows;
@@ -216,32 +241,6 @@ struct CrosscheckArguments {
   std::string program;  ///< with newest
   JsonOption json;
 };
-
-// A word that names a file here names it anywhere: the program runs in another folder.
-std::string Placed(const std::string& word) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(word, error)) return word;
-  return std::filesystem::absolute(word).string();
-}
-
-// `witnesses:` of all engines that are asked for, in place of the scenarios' own.
-std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines) {
-  std::string text;
-  for (const std::string& engine : engines) {
-    const auto named = SplitSet(engine);
-    if (!named) return {};
-    std::string words;
-    for (size_t at = 0; at < named->second.size();) {
-      const size_t end = std::min(named->second.find(' ', at), named->second.size());
-      if (end > at)
-        words += fmt::format("{}\"{}\"", words.empty() ? "" : ", ",
-                             Placed(named->second.substr(at, end - at)));
-      at = end + 1;
-    }
-    text += fmt::format("{}{}: {{command: [{}]}}", text.empty() ? "" : ", ", named->first, words);
-  }
-  return SetValue{"witnesses", "{" + text + "}"};
-}
 
 int WriteAll(const CrosscheckArguments& arguments, const std::vector<CrosscheckRow>& rows) {
   SayText(arguments.json.text(), ToText(rows));

@@ -30,6 +30,10 @@ struct CrosscheckRow {
   std::string why;  ///< why there is no value; "" if there is
 };
 
+/// `witnesses:` of engines NAME=COMMAND, in place of the scenarios' own; empty where one is not
+/// written so.
+[[nodiscard]] std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines);
+
 /// Every engine of a run but the reference itself.
 [[nodiscard]] std::vector<CrosscheckRow> CrosscheckRows(const Report& report);
 

@@ -1,0 +1,170 @@
+// `mbverify benchmark` as a user types it.
+#include <fmt/format.h>
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/output_folder.h"
+#include "base/text.h"
+#include "base/worker_pool.h"
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "cli/options.h"
+#include "cli/terminal.h"
+#include "features/benchmark/benchmark.h"
+#include "features/engines/crosscheck.h"
+#include "math/bytes.h"
+#include "scenario/find_model.h"
+
+namespace mbv {
+namespace {
+
+struct BenchmarkArguments {
+  std::vector<std::string> paths, engines, suites;
+  std::vector<double> steps;
+  std::string out = "out", markdown;
+  int jobs = AllCores();
+  JsonOption json;
+};
+
+// Those given, by path or as scenarios are named; else the shipped ones.
+std::vector<std::string> PathsOf(const std::vector<std::string>& given) {
+  std::vector<std::string> paths;
+  for (const std::string& path : given) paths.push_back(FindScenario(path));
+  if (paths.empty()) paths.push_back(FindScenario("benchmark"));
+  return paths;
+}
+
+// By name, or NAME=COMMAND of a program of the user's; the judging ones always run. Empty after a
+// message.
+std::vector<BenchmarkEngine> EnginesOf(const std::vector<std::string>& words) {
+  if (words.empty()) return BenchmarkEngines();
+  std::vector<BenchmarkEngine> engines;
+  std::vector<std::string> names;
+  for (const BenchmarkEngine& engine : BenchmarkEngines()) {
+    names.push_back(engine.name);
+    if (engine.judges || Contains(words, engine.name)) engines.push_back(engine);
+  }
+  for (const std::string& word : words) {
+    if (Contains(names, word)) continue;
+    const auto named = SplitSet(word);
+    if (!named) {
+      (void)Refuse(fmt::format("--engine: there is no engine '{}'", word),
+                   DidYouMean(word, names, "write NAME=COMMAND, or one of " + Joined(names)));
+      return {};
+    }
+    engines.push_back({.name = named->first, .about = named->second, .command = named->second});
+  }
+  return engines;
+}
+
+// Each case in a process of its own: what one of them does harms no other.
+std::vector<BenchmarkResult> RunAll(const Benchmark& benchmark,
+                                    const std::vector<BenchmarkEngine>& engines, double step_factor,
+                                    const std::string& what, int jobs) {
+  constexpr double kLongestCase_s = 300.0;
+  const std::vector<BenchmarkCase>& cases = benchmark.cases;
+  std::vector<BenchmarkResult> results;
+  ProgressLine progress(true);
+  StreamFromChildren(
+      cases.size(), {.parallel = jobs, .timeout_s = kLongestCase_s},
+      [&](size_t k) { return ToBytes(RunBenchmarkCase(cases[k], engines, step_factor)); },
+      [&](size_t k, const std::optional<std::string>& bytes) {
+        auto result = bytes ? FromBytes<BenchmarkResult>(*bytes) : std::nullopt;
+        if (!result) {
+          result = BenchmarkResult{
+              .name = cases[k].name,
+              .suite = cases[k].suite,
+              .title = cases[k].title,
+              .reason = fmt::format("ended by a crash, or not within {:g} s", kLongestCase_s)};
+        }
+        results.push_back(std::move(*result));
+        progress.Show(what, static_cast<double>(k + 1) / static_cast<double>(cases.size()));
+        return true;
+      });
+  return results;
+}
+
+int RunBenchmark(const BenchmarkArguments& arguments) {
+  Benchmark benchmark;
+  Diagnostics diagnostics;
+  benchmark.cases = ReadBenchmarkCases(PathsOf(arguments.paths), &diagnostics);
+  FindingPrinter(stderr).Print(diagnostics);
+  if (diagnostics.has_errors()) return 2;
+  std::vector<std::string> suites;
+  for (const BenchmarkCase& one : benchmark.cases) {
+    if (!Contains(suites, one.suite)) suites.push_back(one.suite);
+  }
+  for (const std::string& suite : arguments.suites) {
+    if (Contains(suites, suite)) continue;
+    return Refuse(fmt::format("--suite: there is no suite '{}'", suite),
+                  DidYouMean(suite, suites, "suites: " + Joined(suites)));
+  }
+  if (!arguments.suites.empty()) {
+    std::erase_if(benchmark.cases,
+                  [&](const BenchmarkCase& one) { return !Contains(arguments.suites, one.suite); });
+  }
+  benchmark.engines = EnginesOf(arguments.engines);
+  if (benchmark.engines.empty()) return 2;
+  benchmark.results = RunAll(benchmark, benchmark.engines, 1.0, "cases", arguments.jobs);
+  for (const double step : arguments.steps) {
+    std::vector<BenchmarkEngine> stepping = benchmark.engines;
+    benchmark.at_steps.emplace_back(
+        step, RunAll(benchmark, stepping, step, fmt::format("{:g} steps", step), arguments.jobs));
+  }
+  std::FILE* to = arguments.json.text();
+  SayText(to, ToText(benchmark, WantsColor(to), TerminalColumns(to)));
+  const std::string json = arguments.json.Text(ToJson(benchmark));
+  OutputFolder folder(arguments.out, "benchmark");
+  if (const std::string trouble = folder.WriteAll({{"benchmark.html", ToHtml(benchmark)},
+                                                   {"errors.csv", ErrorsCsv(benchmark)},
+                                                   {"cost.csv", CostCsv(benchmark)},
+                                                   {"tables.tex", ToLatex(benchmark)},
+                                                   {"benchmark.json", json}});
+      !trouble.empty()) {
+    return NotWritten(trouble, "choose another folder with --out");
+  }
+  Say(stderr, "results in {}\n", folder.target().string());
+  int exit_code = WorseExit(benchmark.exit_code(), arguments.json.Write(json, {}));
+  if (!arguments.markdown.empty()) {
+    exit_code = WorseExit(exit_code, WriteWholeFile(arguments.markdown, ToMarkdown(benchmark), {}));
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+void AddBenchmarkCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<BenchmarkArguments>();
+  CLI::App* benchmark = app->add_subcommand(
+      "benchmark",
+      "Engines on published cases of closed loops: who meets the numbers, at what cost");
+  benchmark->add_option("cases", arguments->paths,
+                        "case.yaml files or folders of them; the shipped ones if left out");
+  benchmark
+      ->add_option("--engine", arguments->engines,
+                   "an engine by name, or NAME=COMMAND (repeatable), see "
+                   "docs/how-to/external_solvers.md; all if left out. Those that judge always run")
+      ->allow_extra_args(false);
+  benchmark->add_option("--suite", arguments->suites, "only the cases of this suite (repeatable)")
+      ->allow_extra_args(false);
+  benchmark
+      ->add_option("--steps", arguments->steps,
+                   "work and precision: again at these multiples of each scenario's step")
+      ->delimiter(',')
+      ->check(Positive());
+  benchmark->add_option("--out", arguments->out, "folder for results")->capture_default_str();
+  benchmark->add_option("--jobs", arguments->jobs, "cases at once")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  benchmark->add_option("--markdown", arguments->markdown, "writes all tables to this file");
+  arguments->json.AddTo(benchmark);
+  SetFooter(benchmark,
+            {"benchmark", "benchmark --suite modelica --engine simbody",
+             "benchmark my_cases --engine 'mine=python3 my_engine.py' --steps 4,2,0.5"},
+            "0 every case ends as it states, 1 one does not, 2 bad input, 3 none could run");
+  benchmark->callback([arguments, exit_code] { *exit_code = RunBenchmark(*arguments); });
+}
+
+}  // namespace mbv

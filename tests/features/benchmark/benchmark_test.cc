@@ -1,0 +1,235 @@
+// mbverify benchmark: published numbers are met, or it is said who does not meet them.
+#include "features/benchmark/benchmark.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/run_program.h"
+#include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+std::vector<BenchmarkEngine> JudgingEngines() {
+  std::vector<BenchmarkEngine> engines;
+  for (const BenchmarkEngine& engine : BenchmarkEngines()) {
+    if (engine.judges) engines.push_back(engine);
+  }
+  return engines;
+}
+
+// A shipped case in a folder of its own, where its files can be altered.
+class BenchmarkTest : public testing::Test {
+ protected:
+  void Copy(const std::string& name) const {
+    fs::copy(SourcePath("/scenarios/benchmark/" + name),
+             fs::path(PathOf("case.yaml")).parent_path(),
+             fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  }
+  void Replace(const std::string& file, const std::string& from, const std::string& to) const {
+    std::string text = ReadAll(PathOf(file));
+    const size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from << " in " << text;
+    Write(file, text.replace(at, from.size(), to));
+  }
+  void Write(const std::string& file, const std::string& text) const {
+    std::ofstream(PathOf(file)) << text;
+  }
+  [[nodiscard]] std::string PathOf(const std::string& file) const { return folder.PathOf(file); }
+
+  [[nodiscard]] BenchmarkCase Read() const {
+    Diagnostics diagnostics;
+    const auto read = ReadBenchmarkCase(PathOf("case.yaml"), &diagnostics);
+    EXPECT_TRUE(read.has_value()) << diagnostics.Text();
+    return read.value_or(BenchmarkCase());
+  }
+  [[nodiscard]] BenchmarkResult Run() const { return RunBenchmarkCase(Read(), JudgingEngines()); }
+  [[nodiscard]] std::string Findings(const std::string& text) const {
+    Write("case.yaml", text);
+    return CheckBenchmarkCase(PathOf("case.yaml")).Text();
+  }
+
+  test::TestFolder folder{"benchmark_case"};
+};
+
+TEST_F(BenchmarkTest, ConfirmsPublishedMotion) {
+  Copy("damped_pendulum");
+  const BenchmarkResult result = Run();
+  EXPECT_EQ(result.verdict, CaseVerdict::kConfirmed) << result.reason;
+  size_t ran = 0;
+  for (const EngineOnCase& engine : result.engines) {
+    if (!engine.ran()) continue;
+    ++ran;
+    EXPECT_GT(engine.cpu_s, 0.0) << engine.engine;
+    ASSERT_EQ(engine.series.size(), 2u);
+    EXPECT_GT(engine.series[0].largest, 0.0) << "the published table is no copy of ours";
+  }
+  EXPECT_EQ(ran, 2u);
+}
+
+TEST_F(BenchmarkTest, AWrongMassIsContradicted) {
+  Copy("double_pendulum");
+  Replace("model.yaml", "mass: ", "mass: 1.02*");
+  const BenchmarkResult result = Run();
+  EXPECT_EQ(result.verdict, CaseVerdict::kContradicted) << result.reason;
+  EXPECT_THAT(result.reason, HasSubstr("revolute1.w"));
+  EXPECT_FALSE(AsStated(Read(), result));
+}
+
+TEST_F(BenchmarkTest, AWrongSignIsContradicted) {
+  Copy("damped_pendulum");
+  Replace("model.yaml", "gravity: [0, -9.81", "gravity: [0, 9.81");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kContradicted);
+}
+
+TEST_F(BenchmarkTest, AWrongPublishedNumberIsContradictedAndMayBeStated) {
+  Copy("iftomm_a02");
+  Replace("case.yaml", "../../", SourcePath("/scenarios/"));
+  Replace("case.yaml", "value: 0,", "value: 2.0e-11,");
+  const BenchmarkResult result = Run();
+  EXPECT_EQ(result.verdict, CaseVerdict::kContradicted) << result.reason;
+  EXPECT_FALSE(AsStated(Read(), result));
+  Replace("case.yaml", "scenario:", "published_is_wrong: off by 2e-11\nscenario:");
+  EXPECT_TRUE(AsStated(Read(), result));
+}
+
+TEST_F(BenchmarkTest, SaysWhatNoScenarioComputes) {
+  Write("case.yaml",
+        "benchmark: wheel\ntitle: A rolling wheel\nsuite: mine\n"
+        "source: {work: me, licence: mine}\nnot_expressible: wheels do not roll here\n");
+  const BenchmarkResult result = Run();
+  EXPECT_EQ(result.verdict, CaseVerdict::kNotExpressible);
+  EXPECT_EQ(result.reason, "wheels do not roll here");
+  EXPECT_TRUE(AsStated(Read(), result));
+}
+
+TEST_F(BenchmarkTest, ASignalThatIsNotRecordedIsNotRun) {
+  Copy("damped_pendulum");
+  Replace("case.yaml", "channel: pin.position", "channel: absent.position");
+  const BenchmarkResult result = Run();
+  EXPECT_EQ(result.verdict, CaseVerdict::kNotRun);
+  EXPECT_THAT(result.reason, HasSubstr("0 of two judging engines recorded absent.position"));
+}
+
+TEST_F(BenchmarkTest, AnInstantBetweenSamplesIsNotRun) {
+  Copy("damped_pendulum");
+  Replace("published.csv", "\n0.1,", "\n0.1001,");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kNotRun);
+}
+
+TEST_F(BenchmarkTest, ReportsAllFindingsOfACase) {
+  Copy("damped_pendulum");
+  const std::string head = "benchmark: x\ntitle: x\nsuite: x\nscenario: run.yaml\n";
+  const std::string source = "source: {work: x, licence: x}\n";
+  const auto one = [&](const std::string& series) {
+    return Findings(head + source + "published: [{" + series + "}]\n");
+  };
+  const std::string table = "channel: c, why: w, table: published.csv, column: ";
+  EXPECT_EQ(one(table + "rev.phi, relative: 0.01"), "");
+  EXPECT_THAT(one(table + "rev.fi, relative: 0.01"), HasSubstr("did you mean 'rev.phi'"));
+  EXPECT_THAT(one(table + "rev.phi, relative: 0.3"), HasSubstr("verifies nothing"));
+  EXPECT_THAT(one(table + "rev.phi, relative: 0"), HasSubstr("violates > 0"));
+  EXPECT_THAT(one(table + "rev.phi"), HasSubstr("needs either uncertainty or relative"));
+  EXPECT_THAT(one(table + "rev.phi, relative: 0.01, at_start: -1"), HasSubstr("violates > 0"));
+  EXPECT_THAT(one(table + "rev.phi, value: 1, relative: 0.01"), HasSubstr("both table and value"));
+  EXPECT_THAT(one("channel: c, why: w, uncertainty: 1"), HasSubstr("has no numbers"));
+  EXPECT_THAT(one("channel: c, why: w, value: 1, uncertainty: 0.1"), HasSubstr("at_s"));
+  EXPECT_THAT(one("channel: c, value: 1, at_s: 0, uncertainty: 0.1"), HasSubstr("why"));
+  EXPECT_THAT(one("channel: c, why: w, table: none.csv, column: a, relative: 0.01"),
+              HasSubstr("none.csv"));
+  Write("words.csv", "time_s,a\n0,1\n0.1,one\n");
+  EXPECT_THAT(one("channel: c, why: w, table: words.csv, column: a, relative: 0.01"),
+              HasSubstr("words.csv:3:5: error: column 'a' has no number here"));
+  const std::string both = Findings(
+      "benchmark: x\nsuite: x\nscenario: nowhere.yaml\n"
+      "published: []\n");
+  for (const char* missing : {"title", "source", "nowhere.yaml", "published: is empty"}) {
+    EXPECT_THAT(both, HasSubstr(missing));
+  }
+  EXPECT_THAT(Findings(head + source + "not_expressible: why\n"),
+              HasSubstr("scenario: the case is not_expressible"));
+}
+
+// Errors of two judging engines against one published value of uncertainty 1.
+CaseVerdict VerdictOf(double a, double b, double spread) {
+  PublishedSeries series;
+  series.channel = series.called = "c";
+  series.time_s = {0.0};
+  series.values = {5.0};
+  series.uncertainty = {1.0};
+  BenchmarkCase benchmark;
+  benchmark.published = {series};
+  BenchmarkResult result;
+  const auto add = [&](const std::string& engine, double error) {
+    EngineOnCase& row = result.engines.emplace_back();
+    row.engine = engine;
+    row.series = {{.largest = error, .time_s = 0.0, .ratio = error}};
+  };
+  add("reference", a);
+  add("simulation", b);
+  add("simbody", 100.0);
+  Judge(benchmark, {spread}, &result);
+  return result.verdict;
+}
+
+TEST(BenchmarkVerdict, FollowsTheJudgingEngines) {
+  EXPECT_EQ(VerdictOf(0.2, 0.3, 0.5), CaseVerdict::kConfirmed);
+  EXPECT_EQ(VerdictOf(1.0, 1.0, 1.0), CaseVerdict::kConfirmed);
+  EXPECT_EQ(VerdictOf(1.1, 1.2, 0.1), CaseVerdict::kContradicted);
+  EXPECT_EQ(VerdictOf(0.9, 1.1, 0.2), CaseVerdict::kDisagree);
+  EXPECT_EQ(VerdictOf(0.9, 0.9, 1.8), CaseVerdict::kDisagree);
+  EXPECT_EQ(VerdictOf(0.2, kNan, kNan), CaseVerdict::kNotRun);
+}
+
+TEST(BenchmarkCases, ShippedOnesAreSoundAndHaveTheirSource) {
+  Diagnostics diagnostics;
+  const auto cases = ReadBenchmarkCases({SourcePath("/scenarios/benchmark")}, &diagnostics);
+  EXPECT_TRUE(diagnostics.findings().empty()) << diagnostics.Text();
+  EXPECT_GE(cases.size(), 40u);
+  for (const BenchmarkCase& one : cases) {
+    EXPECT_EQ(fs::path(one.file).parent_path().filename(), one.name)
+        << "folders are named as cases";
+    EXPECT_FALSE(one.source.url.empty()) << one.file;
+  }
+}
+
+TEST(BenchmarkCommand, WritesTheSameErrorsTwiceAndFindsCasesByName) {
+  const Program mbverify("benchmark");
+  const std::string call =
+      "benchmark benchmark/iftomm_a01 benchmark/iftomm_a05 --engine reference ";
+  const auto run = [&](const std::string& out) {
+    const ProgramResult result = mbverify(call + "--out " + (mbverify.folder() / out).string());
+    EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+    EXPECT_THAT(result.out, HasSubstr("2 cases, 5 published series: 2 confirmed"));
+    return ReadAll(mbverify.folder() / out / "benchmark/errors.csv");
+  };
+  const std::string errors = run("a");
+  EXPECT_THAT(errors, HasSubstr("iftomm,iftomm_a05,confirmed,reference,rod1.force,"));
+  EXPECT_EQ(errors, run("b"));
+  for (const char* file : {"benchmark.html", "cost.csv", "tables.tex", "benchmark.json"}) {
+    EXPECT_GT(fs::file_size(mbverify.folder() / "a/benchmark" / file), 100u) << file;
+  }
+}
+
+TEST(BenchmarkCommand, RefusesWhatIsNoCaseEngineOrSuite) {
+  const Program mbverify("benchmark_bad");
+  const auto refuse = [&](const std::string& words, const std::string& why) {
+    const ProgramResult result = mbverify("benchmark " + words);
+    EXPECT_EQ(result.exit_code, 2) << words;
+    EXPECT_THAT(result.err, HasSubstr(why));
+  };
+  refuse("benchmark/iftomm_a01 --engine simbdy", "did you mean 'simbody'");
+  refuse("benchmark/iftomm_a01 --suite modelika", "there is no suite 'modelika'");
+  refuse(mbverify.folder().string(), "has no case.yaml");
+  refuse("benchmark/iftomm_a01 --steps 0", "--steps");
+}
+
+}  // namespace
+}  // namespace mbv
