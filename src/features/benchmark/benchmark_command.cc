@@ -109,9 +109,8 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
   if (benchmark.engines.empty()) return 2;
   benchmark.results = RunAll(benchmark, benchmark.engines, 1.0, "cases", arguments.jobs);
   for (const double step : arguments.steps) {
-    std::vector<BenchmarkEngine> stepping = benchmark.engines;
-    benchmark.at_steps.emplace_back(
-        step, RunAll(benchmark, stepping, step, fmt::format("{:g} steps", step), arguments.jobs));
+    benchmark.at_steps.emplace_back(step, RunAll(benchmark, benchmark.engines, step,
+                                                 fmt::format("{:g} steps", step), arguments.jobs));
   }
   std::FILE* to = arguments.json.text();
   SayText(to, ToText(benchmark, WantsColor(to), TerminalColumns(to)));

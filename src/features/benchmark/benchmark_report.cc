@@ -189,27 +189,31 @@ Table SourceTable(const Benchmark& benchmark) {
   return table;
 }
 
-// Error over processor time, an engine a line: medians over the cases of each multiple of the step.
+// Error over processor time by that of the reference, an engine a line: medians over the cases at
+// each multiple of their steps.
 LinePlot WorkPrecision(const Benchmark& benchmark) {
   LinePlot plot{.title = "work and precision",
-                .x_label = "processor time by that of the scenario's step",
+                .x_label = "processor time by that of the reference",
                 .y_label = "error of drive forces, of a free motion of its motion",
                 .log_x = true,
                 .log_y = true};
   for (const BenchmarkEngine& engine : benchmark.engines) {
-    PlotLine line{.label = engine.name};
-    for (const auto& [multiple, results] : benchmark.at_steps) {
+    PlotLine line{.label = engine.name, .markers = true};
+    const auto add = [&](const std::vector<BenchmarkResult>& results) {
       std::vector<double> errors, costs;
       for (size_t k = 0; k < results.size(); ++k) {
         const EngineOnCase* row = FindEngine(results[k], engine.name);
-        const EngineOnCase* stated = FindEngine(benchmark.results[k], engine.name);
-        if (row == nullptr || !row->ran() || stated == nullptr || !stated->ran()) continue;
+        const EngineOnCase* reference = FindEngine(benchmark.results[k], "reference");
+        if (row == nullptr || !row->ran() || reference == nullptr || !reference->ran()) continue;
         errors.push_back(std::isfinite(row->force) ? row->force : row->motion);
-        costs.push_back(row->cpu_s / stated->cpu_s);
+        costs.push_back(row->cpu_s / reference->cpu_s);
       }
       const double error = MedianOf(errors), cost = MedianOf(costs);
       if (std::isfinite(error) && std::isfinite(cost)) line.points.emplace_back(cost, error);
-    }
+    };
+    add(benchmark.results);
+    for (const auto& [multiple, results] : benchmark.at_steps) add(results);
+    std::ranges::sort(line.points);
     if (!line.points.empty()) plot.lines.push_back(std::move(line));
   }
   return plot;
@@ -299,10 +303,7 @@ std::string ToHtml(const Benchmark& benchmark) {
   page.Add("Engines", "Engines", ToHtml(RankingTable(benchmark)));
   page.Add("Cases", "Cases", ToHtml(CaseTable(benchmark)));
   ReportSection errors{.title = "Errors", .link = "Errors"};
-  for (const Table& table : ErrorTables(benchmark)) {
-    errors.Add(Paragraph{table.caption});
-    errors.Add(table);
-  }
+  for (const Table& table : ErrorTables(benchmark)) errors.Add(table);
   page.Add(errors);
   if (!benchmark.at_steps.empty()) {
     ReportSection work{.title = "Work and precision", .link = "Work"};
