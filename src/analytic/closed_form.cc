@@ -1,7 +1,5 @@
 #include "analytic/closed_form.h"
 
-#include <chrono>
-
 #include "base/roles.h"
 #include "mechanism/channels.h"
 
@@ -19,7 +17,7 @@ ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
   run.trace.witness = role::kAnalytic.name;
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
 
-  const auto start = std::chrono::steady_clock::now();
+  const ComputingTime time;
   CommandSample command;
   ClosedFormSample sample;
   const ChannelColumns columns(run.trace.channels);
@@ -38,8 +36,7 @@ ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
     }
     row.tail(sample.extra.size()) = sample.extra.transpose();
   }
-  run.summary.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  time.StopInto(&run.summary);
   return run;
 }
 

@@ -1,7 +1,6 @@
 #include "reference/forward.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
@@ -189,15 +188,14 @@ ForwardRun RunForwardReference(const Mechanism& mechanism, const Motion& motion,
                                const ForwardOptions& options) {
   MBV_DEMAND(motion.free(), motion.commands.size());
   MBV_DEMAND(options.tolerance > 0.0, options.tolerance);
-  const auto begin = std::chrono::steady_clock::now();
+  const ComputingTime time;
   ForwardRun run;
   run.trace.witness = role::kReference.name;
   std::vector<Channel> channels = internal::ReferenceChannels(mechanism, motion, options.reactions);
   for (Channel& channel : WorkChannels(mechanism)) channels.push_back(std::move(channel));
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
   run.summary = Integrate(mechanism, motion, options, &run);
-  run.summary.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  time.StopInto(&run.summary);
   return run;
 }
 

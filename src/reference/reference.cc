@@ -1,7 +1,5 @@
 #include "reference/reference.h"
 
-#include <chrono>
-
 #include "base/roles.h"
 #include "reference/closure_solver.h"
 #include "reference/force_solver.h"
@@ -52,7 +50,7 @@ RunSummary ReferenceSolver::Dynamics(const CommandSample& command, ReferenceSamp
 ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
                           const ReferenceOptions& options,
                           const std::function<void(size_t i, CommandSample* command)>& commands) {
-  const auto start = std::chrono::steady_clock::now();
+  const ComputingTime time;
   ReferenceRun run;
   run.trace.witness = role::kReference.name;
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s),
@@ -71,8 +69,7 @@ ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
     internal::WriteSample(sample, columns, row);
     run.trace.values.row(static_cast<Eigen::Index>(i)) = row;
   }
-  run.summary.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  time.StopInto(&run.summary);
   return run;
 }
 

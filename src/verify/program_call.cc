@@ -55,6 +55,7 @@ std::optional<ProgramFailure> ProgramCall::Run() {
   pool.ended = [&](size_t, const WorkerEnd& how) { end = how; };
   if (!pool.Run({job})) return ProgramFailure{WitnessGap::kSignal, "was stopped"};
   wall_s_ = end.cost.wall_s;
+  cpu_s_ = end.cost.cpu_s;
   const auto failed = [&](WitnessGap gap, const std::string& how) {
     return ProgramFailure{gap, how + OutputTail()};
   };

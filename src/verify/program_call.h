@@ -35,11 +35,12 @@ class ProgramCall {
   [[nodiscard]] std::string OutputTail() const;
   /// Of the program's whole run.
   [[nodiscard]] double wall_s() const { return wall_s_; }
+  [[nodiscard]] double cpu_s() const { return cpu_s_; }
 
  private:
   const ForeignWitness& witness_;
   ScratchFolder folder_;
-  double wall_s_ = 0.0;
+  double wall_s_ = 0.0, cpu_s_ = 0.0;
 };
 
 }  // namespace mbv

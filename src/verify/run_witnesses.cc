@@ -48,6 +48,7 @@ class ForeignRunner {
     record_.summary =
         failure ? NotRun(Shortened(OneLine(failure->text), 1000)) : RunSummary::Done();
     record_.summary.wall_s = call_.wall_s();
+    record_.summary.cpu_s = call_.cpu_s();
     if (failure) record_.trace = {};
     if (failure) record_.gap = failure->gap;
     return std::move(record_);
@@ -520,6 +521,7 @@ void RunExtrapolated(const Scenario& scenario, const Mechanism& mechanism,
   witness->run.loop_wall_s += runs[1].loop_wall_s;
   witness->run.loop_cpu_s += runs[1].loop_cpu_s;
   witness->run.summary.wall_s += runs[1].summary.wall_s;
+  witness->run.summary.cpu_s += runs[1].summary.cpu_s;
 }
 
 }  // namespace

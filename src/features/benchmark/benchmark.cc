@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "base/text.h"
@@ -23,13 +22,6 @@ constexpr const char* kSimulation = "simulation";
 constexpr const char* kMujoco = "mujoco";
 constexpr const char* kMujocoDefault = "mujoco_default";
 
-// Of this process, its threads included; programs that it starts are not.
-double ProcessorTime() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 // A computed trace, or why there is none.
 struct Computed {
   std::string engine;
@@ -38,12 +30,13 @@ struct Computed {
   double cpu_s = kNan;
 };
 
-Computed ComputedBy(const std::string& engine, const WitnessRecord* record, double cpu_s) {
-  Computed computed{.engine = engine, .cpu_s = cpu_s};
+Computed ComputedBy(const std::string& engine, const WitnessRecord* record) {
+  Computed computed{.engine = engine};
   if (record == nullptr) {
     computed.why = "takes no part in this scenario";
     return computed;
   }
+  computed.cpu_s = record->summary.cpu_s;
   if (record->foreign) {
     computed.program = record->foreign->program;
     computed.cpu_s = record->foreign->compute_s;
@@ -112,37 +105,29 @@ class CaseRun {
       : benchmark_(benchmark), engines_(engines), prepared_(*prepared), runner_(*prepared) {}
 
   void Run(BenchmarkResult* result) {
-    const double closed_form_s = RunTimed(role::kAnalytic);
-    const double reference_s = RunTimed(role::kReference);
+    for (const Role* role : {&role::kAnalytic, &role::kReference}) {
+      if (runner_.TakesPart(*role)) runner_.Run(*role);
+    }
     RunSimulations();
     runner_.RunForeign();
     const WitnessRuns& runs = runner_.runs();
     std::vector<Computed> all;
     for (const BenchmarkEngine& engine : engines_) {
       if (engine.name == kClosedForm) {
-        all.push_back(ComputedBy(engine.name, runs.Find(role::kAnalytic), closed_form_s));
+        all.push_back(ComputedBy(engine.name, runs.Find(role::kAnalytic)));
       } else if (engine.name == kReference) {
-        all.push_back(ComputedBy(engine.name, runs.Find(role::kReference), reference_s));
+        all.push_back(ComputedBy(engine.name, runs.Find(role::kReference)));
       } else if (engine.command.empty()) {
-        all.push_back(ComputedBy(engine.name));
+        all.push_back(Simulation(engine.name));
       } else {
         const auto found = std::ranges::find(runs.records, engine.name, &WitnessRecord::name);
-        all.push_back(
-            ComputedBy(engine.name, found == runs.records.end() ? nullptr : &*found, kNan));
+        all.push_back(ComputedBy(engine.name, found == runs.records.end() ? nullptr : &*found));
       }
     }
     Measure(runs, all, result);
   }
 
  private:
-  // Its processor time [s].
-  double RunTimed(const Role& role) {
-    if (!runner_.TakesPart(role)) return kNan;
-    const double begin = ProcessorTime();
-    runner_.Run(role);
-    return ProcessorTime() - begin;
-  }
-
   [[nodiscard]] bool Wants(const char* engine) const {
     return std::ranges::find(engines_, engine, &BenchmarkEngine::name) != engines_.end();
   }
@@ -170,7 +155,7 @@ class CaseRun {
     }
   }
 
-  [[nodiscard]] Computed ComputedBy(const std::string& name) const {
+  [[nodiscard]] Computed Simulation(const std::string& name) const {
     const auto found = std::ranges::find(simulations_, name, &Simulated::name);
     Computed computed{.engine = name};
     if (found == simulations_.end()) {
@@ -182,11 +167,6 @@ class CaseRun {
     if (computed.why.empty()) computed.trace = &found->run.trace;
     return computed;
   }
-  [[nodiscard]] static Computed ComputedBy(const std::string& name, const WitnessRecord* record,
-                                           double cpu_s) {
-    return mbv::ComputedBy(name, record, cpu_s);
-  }
-
   [[nodiscard]] bool Judges(const std::string& engine) const {
     const auto found = std::ranges::find(engines_, engine, &BenchmarkEngine::name);
     return found != engines_.end() && found->judges;

@@ -22,10 +22,10 @@ namespace {
 
 using Rows = std::vector<CrosscheckRow>;
 
-// A run's time by its samples: of an external program what it reports of its computation, else with
-// the time to start it and to read and write files.
+// Processor time by samples: of an external program what it reports of its computation, else its
+// whole run.
 double MicrosecondsEach(const WitnessRecord& witness) {
-  double seconds = witness.summary.wall_s;
+  double seconds = witness.summary.cpu_s;
   if (witness.foreign && !std::isnan(witness.foreign->compute_s))
     seconds = witness.foreign->compute_s;
   const auto samples = static_cast<double>(witness.trace.time_s.size());

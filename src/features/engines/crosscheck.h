@@ -25,7 +25,8 @@ struct CrosscheckRow {
   double force_nrmse = kNan;  ///< of all drive forces, against the generic reference
   double pose_m = kNan;       ///< outputs' origins, against the generic reference
   double loop_gap_m = kNan;   ///< its own largest; NaN if it reports none
-  /// Wall time by samples, of its computation or of its whole run; NaN where it is not timed alone.
+  /// Processor time by samples, of its computation or of its whole run; NaN where it is not timed
+  /// alone.
   double sample_us = kNan;
   std::string why;  ///< why there is no value; "" if there is
 };

@@ -777,9 +777,9 @@ RunSummary OwnStepper::Run() {
     const double t = static_cast<double>(n) * h_;
     if (RunSummary summary = Command(n); !summary.ok()) return summary;
     if (n % per_sample == 0) Record(n / per_sample, t);
-    const double from = ThreadSeconds();
+    const double from = ComputingTime::ThreadSeconds();
     mj_step(m_, d_.get());
-    cpu_s += ThreadSeconds() - from;
+    cpu_s += ComputingTime::ThreadSeconds() - from;
     if (RunSummary trouble = Trouble(t); !trouble.ok()) return trouble;
   }
   run_->cost_ms = 1e3 * cpu_s / (static_cast<double>(samples * per_sample + 1) * h_);

@@ -47,9 +47,10 @@ void Append(const Trace& more, Trace* all) {
 }
 
 void Append(RunSummary&& more, RunSummary* all) {
-  const double wall_s = all->wall_s + more.wall_s;
+  const double wall_s = all->wall_s + more.wall_s, cpu_s = all->cpu_s + more.cpu_s;
   if (all->ok()) *all = std::move(more);
   all->wall_s = wall_s;
+  all->cpu_s = cpu_s;
 }
 
 template <typename T, typename Same>

@@ -256,10 +256,6 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
   if (!loaded.bench) return outcome;
   const StudyBench& bench = *loaded.bench;
   const StudyShare& share = options.points.share;
-  if (share.size(bench.points().count()) == 0) {
-    return Refused(std::move(outcome), file,
-                   fmt::format("has {} points for {} shards", bench.points().count(), share.count));
-  }
   StudyFolder folder(
       options.out_dir,
       {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share, {}});

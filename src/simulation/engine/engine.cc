@@ -2,7 +2,6 @@
 
 #include <mujoco/mujoco.h>
 #include <array>
-#include <ctime>
 
 namespace mbv::simulation {
 namespace {
@@ -46,12 +45,6 @@ DataHandle MakeData(const mjModel& m) {
   DataHandle data(mj_makeData(&m));
   if (data == nullptr) throw EngineError("could not make the simulation's data");
   return data;
-}
-
-double ThreadSeconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 std::string NameAt(const mjModel& m, mjtObj type, int id, const char* kind) {

@@ -45,9 +45,6 @@ using DataHandle = std::unique_ptr<mjData, DataDeleter>;
 [[nodiscard]] ModelHandle CompileMjcf(const std::string& text);
 [[nodiscard]] DataHandle MakeData(const mjModel& m);
 
-/// Processor time of this thread [s].
-[[nodiscard]] double ThreadSeconds();
-
 /// The object's name, or one like "body_3".
 [[nodiscard]] std::string NameAt(const mjModel& m, mjtObj type, int id, const char* kind);
 

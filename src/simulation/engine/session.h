@@ -167,13 +167,13 @@ class LoopClock {
  public:
   void Stop(SimulationRun* run) const {
     run->loop_wall_s = std::chrono::duration<double>(Clock::now() - wall_).count();
-    run->loop_cpu_s = ThreadSeconds() - cpu_s_;
+    run->loop_cpu_s = ComputingTime::ThreadSeconds() - cpu_s_;
   }
 
  private:
   using Clock = std::chrono::steady_clock;
   const Clock::time_point wall_ = Clock::now();
-  const double cpu_s_ = ThreadSeconds();
+  const double cpu_s_ = ComputingTime::ThreadSeconds();
 };
 
 /// The modes. Start configuration: closed, at the first driven sample. Each fills the run's trace,

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/demand.h"
@@ -319,7 +318,7 @@ SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion, const D
                        const SimulationOptions& options,
                        const std::function<void(double)>& progress) {
   SimulationRun run;
-  const auto start = std::chrono::steady_clock::now();
+  const ComputingTime time;
   {
     simulation::EngineSession session(&run.warnings);
     try {
@@ -334,8 +333,7 @@ SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion, const D
                      .message = std::string("MuJoCo: ") + error.what()};
     }
   }
-  run.summary.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  time.StopInto(&run.summary);
   return run;
 }
 
