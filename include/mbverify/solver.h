@@ -197,8 +197,8 @@ class Solver {
   Status Gravity(const Eigen::VectorXd& q, Eigen::VectorXd* gravity);
 
   /// ∂f/∂q, ∂f/∂v and ∂f/∂a of f = M a + bias, the force along each coordinate (n × n, columns per
-  /// coordinate), without external forces. kUnsupported with dry friction that rests, or grows with
-  /// its load.
+  /// coordinate), without external forces. With friction that grows with its load, of f = J_dᵀ τ of
+  /// the drives' forces. kUnsupported with dry friction that rests.
   struct ForceSlopes {
     Eigen::MatrixXd by_position, by_velocity, by_acceleration;
   };

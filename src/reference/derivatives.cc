@@ -71,7 +71,9 @@ ForceAndSlope Vary(const FrictionLaw& law, const Varying& at) {
 ForceVariations::ForceVariations(const Mechanism& mechanism)
     : mechanism_(mechanism),
       length_(CharacteristicLength(mechanism)),
-      system_(mechanism.bodies.size(), length_) {}
+      system_(mechanism.bodies.size(), length_),
+      spins_(IdleSpins(mechanism)),
+      forces_(mechanism.bodies.size(), length_) {}
 
 // Once refined.
 void ForceVariations::Solve(const VecX& rates, Twists* motion) {
@@ -266,69 +268,91 @@ void ForceVariations::VaryWrenches(const BodyStates& states, const std::vector<L
   Stack(varied, dw);
 }
 
+bool ForceVariations::Begin(ClosureSolver* closure, const MatX& T) {
+  const BodyStates& states = closure->states();
+  rows_ = &closure->rows();
+  const bool other = selection_ != closure->selection();
+  selection_ = closure->selection();
+  if (!system_.Factor(*rows_, selection_, other)) return false;
+  const auto n = static_cast<size_t>(T.cols());
+  unit_.assign(n, Twists(mechanism_.bodies.size(), Vec6::Zero()));
+  varied_.resize(n);
+  for (size_t k = 0; k < n; ++k) {
+    Unstack(T.col(static_cast<Eigen::Index>(k)), &unit_[k]);
+    closure->VaryRows(unit_[k], &varied_[k]);
+  }
+  closure->VaryRows(states.V_WB, &along_V_);
+  moves_ = std::ranges::any_of(states.V_WB, [](const Vec6& V) { return !V.isZero(0.0); });
+  rates_.resize(static_cast<Eigen::Index>(selection_.size()));
+  return true;
+}
+
+void ForceVariations::MoveCoordinate(ClosureSolver* closure, size_t k, Twists* dV, Twists* dA) {
+  const BodyStates& states = closure->states();
+  const RowSet& by = varied_[k];
+  dV->assign(mechanism_.bodies.size(), Vec6::Zero());
+  rates_.setZero();
+  if (moves_) {
+    AddRates(by, states.V_WB, false, -1.0, &rates_);
+    Solve(rates_, dV);
+    closure->VaryRows(*dV, &along_dV_);
+    rates_.setZero();
+    AddRates(along_V_, *dV, false, -1.0, &rates_);
+    AddRates(along_dV_, states.V_WB, false, -1.0, &rates_);
+  }
+  AddRates(by, states.A_WB, true, -1.0, &rates_);
+  Solve(rates_, dA);
+}
+
+void ForceVariations::MoveRate(const BodyStates& states, size_t k, Twists* dA) {
+  rates_.setZero();
+  if (moves_) {
+    AddRates(along_V_, unit_[k], false, -1.0, &rates_);
+    AddRates(varied_[k], states.V_WB, false, -1.0, &rates_);
+  }
+  Solve(rates_, dA);
+}
+
 RunSummary ForceVariations::Differentiate(ClosureSolver* closure, const MatX& T,
                                           const std::vector<LoadSample>& loads,
                                           const std::vector<int>& friction_signs, bool terms,
                                           ForceDerivatives* out) {
   const BodyStates& states = closure->states();
-  rows_ = &closure->rows();
-  const bool other = selection_ != closure->selection();
-  selection_ = closure->selection();
-  if (!system_.Factor(*rows_, selection_, other)) {
+  if (!Begin(closure, T)) {
     return {.stop = Stop::kSingular,
             .message = "the coordinates do not determine the motion at this pose"};
   }
   const Eigen::Index n = T.cols();
-  const size_t bodies = mechanism_.bodies.size();
-  const auto rows = static_cast<Eigen::Index>(selection_.size());
   // (4) without δ.
   std::vector<Vec6> required;
   RequiredWrenches(mechanism_, states, loads, friction_signs, &required);
   VecX w, mu, full = VecX::Zero(rows_->size());
   Stack(required, &w);
+  out->force = T.transpose() * w;
   system_.Solve(w, &mu);
-  for (Eigen::Index k = 0; k < rows; ++k) full[selection_[static_cast<size_t>(k)]] = mu[k];
+  for (size_t k = 0; k < selection_.size(); ++k) {
+    full[selection_[k]] = mu[static_cast<Eigen::Index>(k)];
+  }
 
   out->by_position.resize(n, n), out->by_velocity.resize(n, n);
-  const Twists none(bodies, Vec6::Zero());
+  const Twists none(mechanism_.bodies.size(), Vec6::Zero());
   Twists dV = none, dA = none, back = none;
-  std::vector<Twists> unit(static_cast<size_t>(n), none);
-  varied_.resize(static_cast<size_t>(n));
-  for (Eigen::Index k = 0; k < n; ++k) {
-    Unstack(T.col(k), &unit[static_cast<size_t>(k)]);
-    closure->VaryRows(unit[static_cast<size_t>(k)], &varied_[static_cast<size_t>(k)]);
-  }
-  closure->VaryRows(states.V_WB, &along_V_);
-
   std::array<MatX, 4> of_position;
   std::array<MatX, 2> of_velocity;
   if (terms) {
     for (MatX& part : of_position) part.resize(n, n);
     for (MatX& part : of_velocity) part.resize(n, n);
   }
-  const bool moves = std::ranges::any_of(states.V_WB, [](const Vec6& V) { return !V.isZero(0.0); });
-  VecX rates(rows), dw;
+  VecX dw;
   const auto along_T = [&](const Twists& U, const Twists& dv, const Twists& da) {
     VaryWrenches(states, loads, friction_signs, U, dv, da, &dw);
     return VecX(T.transpose() * dw);
   };
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Twists& U = unit[static_cast<size_t>(k)];
-    const RowSet& by = varied_[static_cast<size_t>(k)];
-    // (2) and (3) of a coordinate.
-    rates.setZero();
-    if (moves) {
-      AddRates(by, states.V_WB, false, -1.0, &rates);
-      Solve(rates, &dV);
-      closure->VaryRows(dV, &along_dV_);
-      rates.setZero();
-      AddRates(along_V_, dV, false, -1.0, &rates);
-      AddRates(along_dV_, states.V_WB, false, -1.0, &rates);
-    }
-    AddRates(by, states.A_WB, true, -1.0, &rates);
-    Solve(rates, &dA);
+    const Twists& U = unit_[static_cast<size_t>(k)];
+    MoveCoordinate(closure, static_cast<size_t>(k), &dV, &dA);
     std::fill(back.begin(), back.end(), Vec6::Zero());
-    by.AddWrenches(full, &back);
+    varied_[static_cast<size_t>(k)].AddWrenches(full, &back);
     Stack(back, &dw);
     const VecX second = -T.transpose() * dw;
     out->by_position.col(k) = second + along_T(U, dV, dA);
@@ -338,13 +362,7 @@ RunSummary ForceVariations::Differentiate(ClosureSolver* closure, const MatX& T,
       of_position[2].col(k) = along_T(none, none, dA);
       of_position[3].col(k) = second;
     }
-    // Of a rate.
-    rates.setZero();
-    if (moves) {
-      AddRates(along_V_, U, false, -1.0, &rates);
-      AddRates(by, states.V_WB, false, -1.0, &rates);
-    }
-    Solve(rates, &dA);
+    MoveRate(states, static_cast<size_t>(k), &dA);
     out->by_velocity.col(k) = along_T(none, U, dA);
     if (terms) {
       of_velocity[0].col(k) = along_T(none, U, none);
@@ -365,14 +383,13 @@ RunSummary ForceVariations::Differentiate(ClosureSolver* closure, const MatX& T,
         {"what loops change of accelerations at other velocities (∂b/∂v)", nothing, of_velocity[1]},
     };
   }
-  DifferentiateRates(states, T, unit, closure->first_command(), out);
+  DifferentiateRates(states, T, closure->first_command(), out);
   return RunSummary::Done();
 }
 
 // Of the drives: δ(row T) = δrow T − ν δJ T with Jᵀ ν = rowᵀ.
 void ForceVariations::DifferentiateRates(const BodyStates& states, const MatX& T,
-                                         const std::vector<Twists>& unit, int first_coordinate,
-                                         ForceDerivatives* out) {
+                                         int first_coordinate, ForceDerivatives* out) {
   const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
   const Eigen::Index n = T.cols();
   MatX nu(static_cast<Eigen::Index>(selection_.size()), drives);
@@ -393,19 +410,19 @@ void ForceVariations::DifferentiateRates(const BodyStates& states, const MatX& T
       nu.col(d).setZero();
       continue;
     }
-    for (size_t k = 0; k < unit.size(); ++k) {
-      const ScalarRow by = VariedDriveRow(mechanism_, drive, states, unit[k]);
+    for (size_t k = 0; k < unit_.size(); ++k) {
+      const ScalarRow by = VariedDriveRow(mechanism_, drive, states, unit_[k]);
       for (Eigen::Index j = 0; j < n; ++j) {
-        out->drive_rate_slopes[k](d, j) = Along(by, unit[static_cast<size_t>(j)]);
+        out->drive_rate_slopes[k](d, j) = Along(by, unit_[static_cast<size_t>(j)]);
       }
     }
   }
   if (nu.isZero(0.0)) return;
   VecX rates(nu.rows());
-  for (size_t k = 0; k < unit.size(); ++k) {
+  for (size_t k = 0; k < unit_.size(); ++k) {
     for (Eigen::Index j = 0; j < n; ++j) {
       rates.setZero();
-      AddRates(varied_[k], unit[static_cast<size_t>(j)], false, 1.0, &rates);
+      AddRates(varied_[k], unit_[static_cast<size_t>(j)], false, 1.0, &rates);
       out->drive_rate_slopes[k].col(j) -= nu.transpose() * rates;
     }
   }

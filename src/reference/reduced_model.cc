@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <limits>
 #include <optional>
 
@@ -171,9 +172,9 @@ VecX ReducedModel::Forces(const MatX& T, const std::vector<LoadSample>& loads) {
   return T.transpose() * internal::Stack(required);
 }
 
-RunSummary ReducedModel::CheckFriction(const std::vector<int>& signs) const {
+RunSummary ReducedModel::CheckFriction(const std::vector<int>& signs, bool by_load) const {
   const Mechanism& mechanism = impl_->mechanism;
-  const ForceElement* undetermined = friction_by_load();
+  const ForceElement* undetermined = by_load ? friction_by_load() : nullptr;
   const char* why = "has friction that grows with its load";
   for (size_t e = 0; e < mechanism.elements.size() && undetermined == nullptr; ++e) {
     if (!HasFriction(mechanism.elements[e]) || signs[e] != 0) continue;
@@ -208,13 +209,93 @@ RunSummary ReducedModel::Accelerations(const MatX& T, const std::vector<LoadSamp
   return RunSummary::Done();
 }
 
+RunSummary ReducedModel::ForcesOf(const MatX& T, const std::vector<LoadSample>& loads, VecX* f) {
+  if (friction_by_load() == nullptr) {
+    *f = Forces(T, loads);
+    return RunSummary::Done();
+  }
+  EveryForce every;
+  every.of_drives = true;
+  const RunSummary summary = EachForce(T, loads, &every);
+  if (summary.ok()) *f = ActingRates(T).transpose() * every.acting.force;
+  return summary;
+}
+
 RunSummary ReducedModel::Derivatives(const MatX& T, const std::vector<LoadSample>& loads,
                                      ForceDerivatives* out, bool terms) {
   std::vector<int> signs;
   internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s, &signs);
-  if (RunSummary summary = CheckFriction(signs); !summary.ok()) return summary;
+  RunSummary summary = CheckFriction(signs, false);
+  if (!summary.ok()) return summary;
   if (!impl_->variations) impl_->variations.emplace(impl_->mechanism);
-  return impl_->variations->Differentiate(&*impl_->closure, T, loads, signs, terms, out);
+  internal::ForceVariations& variations = *impl_->variations;
+  summary = variations.Differentiate(&*impl_->closure, T, loads, signs, terms, out);
+  if (!summary.ok() || friction_by_load() == nullptr) return summary;
+  // f = J_dᵀ τ; rates of prescribed joints are constant.
+  EveryForce every;
+  every.of_drives = true;
+  summary = EveryForceOf(T, loads, true, &every);
+  if (!summary.ok()) return summary;
+  const MatX rates = ActingRates(T);
+  const MatX without_q = out->by_position, without_v = out->by_velocity;
+  out->force = rates.transpose() * every.acting.force;
+  out->by_position = rates.transpose() * every.acting.by_position;
+  const Eigen::Index drives = out->drive_rates.rows();
+  for (Eigen::Index k = 0; k < T.cols(); ++k) {
+    out->by_position.col(k) += out->drive_rate_slopes[static_cast<size_t>(k)].transpose() *
+                               every.acting.force.head(drives);
+  }
+  out->by_velocity = rates.transpose() * every.acting.by_velocity;
+  out->by_acceleration = rates.transpose() * every.acting.by_acceleration;
+  if (terms) {
+    out->terms.push_back({"friction by the loads of joints", out->by_position - without_q,
+                          out->by_velocity - without_v});
+  }
+  return summary;
+}
+
+MatX ReducedModel::ActingRates(const MatX& T) const {
+  const Mechanism& mechanism = impl_->mechanism;
+  const MatX of_drives = DriveRates(T);
+  MatX rates(of_drives.rows() + static_cast<Eigen::Index>(mechanism.prescribed.size()), T.cols());
+  rates.topRows(of_drives.rows()) = of_drives;
+  for (size_t p = 0; p < mechanism.prescribed.size(); ++p) {
+    const Joint& joint = mechanism.joints[static_cast<size_t>(mechanism.prescribed[p].joint)];
+    const VecX gradient =
+        internal::GradientOf(JointCoordinateRow(joint, 0, states()), mechanism.bodies.size());
+    rates.row(of_drives.rows() + static_cast<Eigen::Index>(p)) = gradient.transpose() * T;
+  }
+  return rates;
+}
+
+RunSummary ReducedModel::EveryForceOf(const MatX& T, const std::vector<LoadSample>& loads,
+                                      bool slopes, EveryForce* out) {
+  std::vector<int> signs;
+  internal::FrictionDirections(impl_->mechanism, states(), impl_->motion.duration_s, &signs);
+  // By load it is what it is where drives exert the forces.
+  const bool by_load = friction_by_load() != nullptr;
+  RunSummary summary = CheckFriction(signs, by_load && !out->of_drives);
+  if (summary.ok() && by_load) summary = AllForces(loads);
+  if (!summary.ok()) return summary;
+  if (!impl_->variations) impl_->variations.emplace(impl_->mechanism);
+  const VecX load_friction = by_load ? sample().load_friction : VecX();
+  return impl_->variations->DifferentiateAll(&*impl_->closure, T, loads, signs, load_friction,
+                                             slopes, out);
+}
+
+RunSummary ReducedModel::AllDerivatives(const MatX& T, const std::vector<LoadSample>& loads,
+                                        EveryForce* out) {
+  out->of_drives = true;
+  RunSummary summary = EveryForceOf(T, loads, true, out);
+  if (summary.ok() || friction_by_load() != nullptr) return summary;
+  if (summary.stop != Stop::kSingular && summary.stop != Stop::kUnsupported) return summary;
+  out->of_drives = false;
+  return EveryForceOf(T, loads, true, out);
+}
+
+RunSummary ReducedModel::EachForce(const MatX& T, const std::vector<LoadSample>& loads,
+                                   EveryForce* out) {
+  return EveryForceOf(T, loads, false, out);
 }
 
 MatX StiffnessOf(const ForceDerivatives& of, const VecX& drive_forces) {
@@ -227,11 +308,12 @@ MatX StiffnessOf(const ForceDerivatives& of, const VecX& drive_forces) {
 
 bool MakeMotionDerivatives(const ForceDerivatives& of, const VecX& drive_forces,
                            MotionDerivatives* out) {
-  const MatX M = 0.5 * (of.by_acceleration + of.by_acceleration.transpose());
+  // Friction by load makes it unsymmetric.
+  const MatX& M = of.by_acceleration;
   const VecX scale =
       M.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<MatX> mass(scale.asDiagonal() * M * scale.asDiagonal());
-  if (mass.info() != Eigen::Success || !(mass.rcond() > kLeastMass)) return false;
+  const Eigen::PartialPivLU<MatX> mass(scale.asDiagonal() * M * scale.asDiagonal());
+  if (!(mass.rcond() > kLeastMass)) return false;
   const auto divided = [&](const MatX& by) {
     return MatX(scale.asDiagonal() * mass.solve(scale.asDiagonal() * by));
   };

@@ -25,10 +25,15 @@
 
 namespace mbv {
 
-/// Of f(q, v, a) = M a + h, the force along each coordinate: ∂f/∂q, ∂f/∂v and ∂f/∂a = M, each
-/// n × n with a column per coordinate [N or N m per m or rad, and per s].
-struct ForceDerivatives {
+/// Some forces, as functions of the coordinates, their rates and accelerations; a column per
+/// coordinate.
+struct ForceSlopes {
+  VecX force;
   MatX by_position, by_velocity, by_acceleration;
+};
+/// Of f(q, v, a) = M a + h, the force along each coordinate: ∂f/∂q, ∂f/∂v and ∂f/∂a, which is M
+/// where no friction grows with loads, each n × n [N or N m per m or rad, and per s].
+struct ForceDerivatives : ForceSlopes {
   MatX drive_rates;                     ///< J_d: drives × n
   std::vector<MatX> drive_rate_slopes;  ///< ∂J_d/∂q_k
   /// What ∂f/∂q and ∂f/∂v are sums of (reference/derivatives.h), where it was asked for.
@@ -37,6 +42,17 @@ struct ForceDerivatives {
     MatX by_position, by_velocity;
   };
   std::vector<Term> terms;
+};
+/// Every force that a motion needs [N or N m].
+struct EveryForce {
+  /// Drives and prescribed joints exert what acts; false: the coordinates do, where drives are too
+  /// few or share their forces.
+  bool of_drives = false;
+  ForceSlopes acting;     ///< of drives and prescribed joints, or of the coordinates
+  ForceSlopes reactions;  ///< joints · 6, as ReactionChannels()
+  /// Per component of reactions: statics leaves it no choice, here and at states nearby.
+  std::vector<bool> unique;
+  double control = kNan;  ///< smallest singular value of the equations of forces
 };
 
 /// Of a(q, v, τ) under drive forces τ: ∂a/∂q, ∂a/∂v (n × n) and ∂a/∂τ = M⁻¹ J_dᵀ (n × drives).
@@ -87,21 +103,31 @@ class ReducedModel {
   [[nodiscard]] RunSummary Curvatures(MatX* H);
   /// M of (3), n × n, symmetric.
   [[nodiscard]] MatX MassMatrix(const MatX& T) const;
-  /// An element whose friction grows with the load on its joint, or nullptr. Such friction is no
-  /// function of the state: (3) is without it.
+  /// An element whose friction grows with the load on its joint, or nullptr. Such friction depends
+  /// on where forces act: (3) is without it.
   [[nodiscard]] const ForceElement* friction_by_load() const;
   /// M a + h: the force along each coordinate [N or N m] that the state needs beyond the loads.
   /// Friction at rest counts as 0.
   [[nodiscard]] VecX Forces(const MatX& T, const std::vector<LoadSample>& loads);
+  /// The same with friction by load, f = J_dᵀ τ under forces of drives and prescribed joints, which
+  /// have to be unique.
+  [[nodiscard]] RunSummary ForcesOf(const MatX& T, const std::vector<LoadSample>& loads, VecX* f);
   /// (3) solved for a, with drive forces τ, where Move() was called with a = 0. kSingular where a
   /// coordinate moves no mass; kUnsupported with dry friction at rest or by load, which leave a
   /// choice (free_motion.h integrates those).
   [[nodiscard]] RunSummary Accelerations(const MatX& T, const std::vector<LoadSample>& loads,
                                          const VecX& drive_forces, VecX* a);
-  /// Derivatives of M a + h at the state that Move() reached. kUnsupported with dry friction at
-  /// rest or by load, where there are none.
+  /// Derivatives of M a + h, of ForcesOf() with friction by load, at the state that Move() reached.
+  /// kUnsupported with dry friction at rest, where there are none.
   [[nodiscard]] RunSummary Derivatives(const MatX& T, const std::vector<LoadSample>& loads,
                                        ForceDerivatives* out, bool terms = false);
+  /// Of every force, in the same way; friction by load counts where drives exert the forces.
+  /// kUnsupported also where a joint whose load makes friction bears none.
+  [[nodiscard]] RunSummary AllDerivatives(const MatX& T, const std::vector<LoadSample>& loads,
+                                          EveryForce* out);
+  /// Values alone, of the forces of `out->of_drives`.
+  [[nodiscard]] RunSummary EachForce(const MatX& T, const std::vector<LoadSample>& loads,
+                                     EveryForce* out);
   /// J_d: drives × n.
   [[nodiscard]] MatX DriveRates(const MatX& T) const;
   /// Forces of drives and prescribed joints and all reactions, in sample(); as the reference, the
@@ -110,7 +136,11 @@ class ReducedModel {
 
  private:
   /// kUnsupported where friction makes forces no function of the state that has derivatives.
-  [[nodiscard]] RunSummary CheckFriction(const std::vector<int>& signs) const;
+  [[nodiscard]] RunSummary CheckFriction(const std::vector<int>& signs, bool by_load = true) const;
+  /// Rates of drives, then of prescribed joints, per unit of v.
+  [[nodiscard]] MatX ActingRates(const MatX& T) const;
+  [[nodiscard]] RunSummary EveryForceOf(const MatX& T, const std::vector<LoadSample>& loads,
+                                        bool slopes, EveryForce* out);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

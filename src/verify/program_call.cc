@@ -31,6 +31,21 @@ bool IsInstalledProgram(const std::string& program) {
          fs::is_regular_file(FolderOfMbverify() / program, error);
 }
 
+// The program runs in another folder.
+std::vector<std::string> CommandWords(const std::string& typed) {
+  std::vector<std::string> words;
+  for (size_t at = 0; at < typed.size();) {
+    const size_t end = std::min(typed.find(' ', at), typed.size());
+    std::error_code error;
+    if (end > at) {
+      std::string& word = words.emplace_back(typed.substr(at, end - at));
+      if (fs::is_regular_file(word, error)) word = fs::absolute(word).string();
+    }
+    at = end + 1;
+  }
+  return words;
+}
+
 std::string ProgramCall::WriteInput(const std::string& name, const std::string& text) const {
   if (!folder_.trouble().empty()) return folder_.trouble();
   return WriteFile(folder_.path() / name, text, false);

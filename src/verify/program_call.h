@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/scratch_folder.h"
 #include "comparison/comparison.h"
@@ -12,6 +13,9 @@ namespace mbv {
 
 /// Programs that mbverify installs beside itself.
 [[nodiscard]] bool IsInstalledProgram(const std::string& program);
+
+/// Words of a command that was typed; those that name a file become its path.
+[[nodiscard]] std::vector<std::string> CommandWords(const std::string& typed);
 
 /// Why a program gave nothing.
 struct ProgramFailure {

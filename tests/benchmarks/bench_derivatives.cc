@@ -69,6 +69,15 @@ void WithDerivatives(benchmark::State& state, const std::string& name) {
   }
 }
 
+void OfEveryForce(benchmark::State& state, const std::string& name) {
+  Moving moving(name);
+  EveryForce every;
+  for (auto _ : state) {
+    moving.Step();
+    MBV_DEMAND(moving.model->AllDerivatives(moving.T, {}, &every).ok(), name);
+  }
+}
+
 void ByDualNumbers(benchmark::State& state, const std::string& name) {
   Moving moving(name);
   ExactDerivatives slopes;
@@ -84,6 +93,7 @@ void ByDualNumbers(benchmark::State& state, const std::string& name) {
 #define MBV_ALL(name)                                                             \
   BENCHMARK_CAPTURE(InverseDynamics, name, #name)->Unit(benchmark::kMicrosecond); \
   BENCHMARK_CAPTURE(WithDerivatives, name, #name)->Unit(benchmark::kMicrosecond); \
+  BENCHMARK_CAPTURE(OfEveryForce, name, #name)->Unit(benchmark::kMicrosecond);    \
   BENCHMARK_CAPTURE(ByDualNumbers, name, #name)->Unit(benchmark::kMicrosecond)
 MBV_ALL(stabilizing_platform);
 MBV_ALL(spr_tripod);

@@ -55,6 +55,7 @@ constexpr Call kCalls[] = {
     {"workspace four_bar --modes all --out OUT/x", 0},
     {"workspace friction_five_bar --joint-space --over motor1,motor2 --out OUT/x", 0},
     {"linearise four_bar --out OUT/x", 0},
+    {"linearise spr_tripod/tool_load --time 0.2 --data mat --out OUT/x", 0},
     {"audit spr_tripod", 0},
     {"model four_bar", 0},
     {"model stabilizing_platform", 0},

@@ -77,5 +77,87 @@ TEST(Derivatives, AreTheSlopesOfForces) {
   }
 }
 
+// Rows in units of work, of what is unique.
+VecX Counted(const Mechanism& mechanism, const EveryForce& of, const ForceSlopes& forces) {
+  const double length = CharacteristicLength(mechanism);
+  VecX unit(forces.force.size());
+  for (Eigen::Index i = 0; i < unit.size(); ++i) {
+    unit[i] = (i % 6 < 3 ? length : 1.0) * (of.unique[static_cast<size_t>(i)] ? 1.0 : 0.0);
+  }
+  return unit;
+}
+
+// Of every force of a state, against differences; how many of their components are unique.
+size_t CheckEveryForce(const Mechanism& mechanism, unsigned seed) {
+  Differentiated subject(mechanism);
+  if (subject.coordinates.empty()) return 0;
+  Load following;
+  AddAllLoads(&subject, &following);
+  subject.Choose(seed);
+  VecX q = subject.q, v = subject.v, a = subject.a;
+  const VecX& unit = subject.unit;
+  const auto n = static_cast<Eigen::Index>(subject.coordinates.size());
+  EveryForce got;
+  MatX T;
+  (void)subject.Forces(q, v, a);
+  EXPECT_TRUE(subject.reduced->Motions(&T).ok());
+  const RunSummary summary = subject.reduced->AllDerivatives(T, subject.loads, &got);
+  EXPECT_TRUE(summary.ok()) << mechanism.name << ": " << summary.message;
+  if (!summary.ok()) return 0;
+  const VecX rows = Counted(mechanism, got, got.reactions);
+  // They are those of the forces' own solver.
+  if (got.of_drives && subject.reduced->AllForces(subject.loads).ok()) {
+    const ReferenceSample& sample = subject.reduced->sample();
+    const VecX reactions = MatX(sample.reactions.transpose()).reshaped();
+    EXPECT_LT((reactions - got.reactions.force).cwiseProduct(rows).norm(),
+              1e-10 * (got.reactions.force.cwiseProduct(rows).norm() + got.acting.force.norm()))
+        << mechanism.name;
+    EXPECT_LT((sample.drive_force - got.acting.force.head(sample.drive_force.size())).norm(),
+              1e-10 * sample.drive_force.norm() + 1e-16)
+        << mechanism.name;
+  }
+  EveryForce there;
+  there.of_drives = got.of_drives;
+  const auto check = [&](const char* of, VecX* varied, const VecX& steps, const MatX& reactions,
+                         const MatX& acting) {
+    MatX slopes(rows.size() + acting.rows(), n), known(slopes.rows(), n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double at = (*varied)[k];
+      slopes.col(k) = SlopesAt(
+          [&](double x) {
+            (*varied)[k] = x;
+            VecX all = VecX::Constant(slopes.rows(), kNan);
+            if (!subject.Forces(q, v, a).allFinite()) return all;
+            MatX T_there;
+            if (!subject.reduced->Motions(&T_there).ok() ||
+                !subject.reduced->EachForce(T_there, subject.loads, &there).ok()) {
+              return all;
+            }
+            all << there.reactions.force.cwiseProduct(rows), there.acting.force;
+            return all;
+          },
+          at, steps[k]);
+      (*varied)[k] = at;
+    }
+    known << rows.asDiagonal() * reactions, acting;
+    // Reactions of some are all 0: those of what acts are their scale.
+    EXPECT_LT(OffBy(known * unit.asDiagonal(), slopes * unit.asDiagonal()), 1e-8)
+        << mechanism.name << " " << of;
+  };
+  check("∂q", &q, 0.5 * subject.share * unit, got.reactions.by_position, got.acting.by_position);
+  check("∂v", &v, 0.1 * v.cwiseAbs(), got.reactions.by_velocity, got.acting.by_velocity);
+  check("∂a", &a, unit, got.reactions.by_acceleration, got.acting.by_acceleration);
+  return static_cast<size_t>(std::ranges::count(got.unique, true));
+}
+
+TEST(Derivatives, OfEveryForceAreItsSlopes) {
+  unsigned seed = 1;
+  size_t unique = 0;
+  for (const Mechanism& mechanism : MechanismsWithDerivatives()) {
+    unique += CheckEveryForce(mechanism, seed++);
+  }
+  EXPECT_GT(unique, 800U);
+}
+
 }  // namespace
 }  // namespace mbv::fixtures

@@ -77,6 +77,23 @@ printf('%.17g %.17g %s\n', simulated.time_s, simulated.values, simulated.names{1
             "0 0.29999999999999999 arm.motor.force\n");
 }
 
+TEST(DataFile, OctaveReadsMatrices) {
+  const test::TestFolder folder("matrices");
+  std::string trouble;
+  DataMatrices data{.about = {{"mechanism", "four_bar"}},
+                    .matrices = {{"A", MatX(2, 3)}, {"empty", MatX(0, 2)}},
+                    .names = {{"coordinates", {"a.x", "b"}}}};
+  data.matrices[0].second << 1, 2, 3, 4, 0.1, -6;
+  folder.Write("linear.mat", MatBytes(data, &trouble));
+  EXPECT_EQ(trouble, "");
+  const std::string script = folder.Write("read.m", R"(load linear.mat
+printf('%s %s %s\n', info.mechanism, coordinates{1}, coordinates{2});
+printf('%.17g ', A(1, :), A(2, :), size(empty)); printf('\n');
+)");
+  EXPECT_EQ(OutputOf("cd " + folder.PathOf("") + " && octave-cli --no-init-file --quiet " + script),
+            "four_bar a.x b\n1 2 3 4 0.10000000000000001 -6 0 2 \n");
+}
+
 struct CloseMat {
   void operator()(mat_t* file) const { Mat_Close(file); }
 };

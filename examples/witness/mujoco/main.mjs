@@ -3,10 +3,12 @@
 //   mbverify-witness-mujoco              stiff equalities, rates in the drives' targets
 //   mbverify-witness-mujoco --defaults   MuJoCo's default softness, positions as targets
 //   mbverify-witness-mujoco --rows       instead: rows of the model at given states (mbverify crosscheck --newest)
+//   mbverify-witness-mujoco --derivatives   instead: mjd_transitionFD at a state (mbverify linearise --mujoco)
 //
 // mbverify calls it in a folder of its own (docs/how-to/external_solvers.md).
 import fs from 'node:fs';
 
+import {derivatives} from './derivatives.mjs';
 import {load, messageOf, Refused} from './engine.mjs';
 import {rows} from './rows.mjs';
 import {witness} from './witness.mjs';
@@ -17,7 +19,9 @@ let engine;
 try {
   engine = await load(program);
   answer.version = engine.version;
-  Object.assign(answer, words.includes('--rows') ? rows(engine) : witness(engine, !words.includes('--defaults')));
+  Object.assign(answer, words.includes('--rows')        ? rows(engine) :
+                        words.includes('--derivatives') ? derivatives(engine) :
+                                                          witness(engine, !words.includes('--defaults')));
 } catch (error) {
   if (!(error instanceof Refused)) {
     console.error(messageOf(engine, error));

@@ -310,17 +310,26 @@ class Prover {
   /// Whether drives share their forces.
   [[nodiscard]] bool shared() const { return shared_; }
 
-  /// Of dual numbers, with commands as coordinates: the force along each, or why there is none.
-  std::string Evaluate(const Start& start, std::vector<T>* forces) {
+  /// Of dual numbers, with commands as coordinates: the force along each, or of each drive and
+  /// prescribed joint, and joints · 6 of reactions; or why there are none.
+  std::string Evaluate(const Start& start, std::vector<T>* forces, std::vector<T>* reactions) {
     SampleProof proof;
     model_.StartFrom(start.X_WB, &q_);
     MakeEquations(start);
     std::string trouble = Prove(start, &proof);
+    if (trouble.empty() && shared_) trouble = "drives share their forces";
     if (!trouble.empty()) return trouble;
     std::vector<T> all(forces_.size(), T(0));
     for (size_t k = 0; k < columns_.size(); ++k) all[columns_[k]] = force_[k];
+    const size_t acting = along_commands_ ? motion_.commands.size() : driven_.size();
     const auto first = all.begin() + static_cast<std::ptrdiff_t>(transmitting_);
-    forces->assign(first, first + static_cast<std::ptrdiff_t>(motion_.commands.size()));
+    forces->assign(first, first + static_cast<std::ptrdiff_t>(acting));
+    reactions->clear();
+    const std::vector<Six<T>> on_child = ReactionsOf(carried_, all);
+    for (size_t j = 0; j < on_child.size(); ++j) {
+      const std::array<T, 6> parts = model_.InJoint(mechanism().joints[j], on_child[j], bodies_);
+      reactions->insert(reactions->end(), parts.begin(), parts.end());
+    }
     return "";
   }
 
@@ -741,11 +750,13 @@ class Prover {
     };
     std::vector<T> load(n, T(0)), next;
     double step = kInfinity;
+    // Slopes take the same number of passes again.
+    const double passes = contraction > 0.0 ? 2.0 * std::log(kEps) / std::log(contraction) : 2.0;
     for (int k = 0; k < 1000; ++k) {
       next = loads(load);
       double now = 0.0;
       for (size_t e = 0; e < n; ++e) now = std::max(now, Size(T(next[e] - load[e])));
-      if (!(now < step)) break;
+      if (kIsDual<T> ? k > passes : !(now < step)) break;
       step = now;
       for (size_t e = 0; e < n; ++e) load[e] = Middle(next[e]);
     }
@@ -1079,7 +1090,7 @@ class Prover {
 
 // Why a mechanism in motion is not served.
 std::string WhyNotServed(const Motion& motion) {
-  if (motion.free()) return "a free motion: forces are given, and motions are integrated";
+  if (motion.free()) return "not provable: forces are given, and the motion is integrated";
   return "";
 }
 
@@ -1356,26 +1367,34 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
 std::string DifferentiateExactly(const Mechanism& mechanism, const Motion& motion,
                                  const BodyStates& near, const CommandSample& command,
                                  ExactDerivatives* out) {
-  Prover<exact::Dual> prover(mechanism, motion, CertifyOptions().contradiction, true);
+  Prover<exact::Dual> prover(mechanism, motion, CertifyOptions().contradiction, !out->of_drives);
   Start start;
   start.time_s = command.time_s;
   start.X_WB = near.X_WB, start.coupled = near.coupled, start.turns = near.turns;
   start.command = command;
   const auto n = static_cast<Eigen::Index>(motion.commands.size());
-  std::vector<exact::Dual> forces;
-  out->force.resize(n);
-  for (const auto& [of, matrix] : {std::pair(Start::Of::kPosition, &out->by_position),
-                                   std::pair(Start::Of::kVelocity, &out->by_velocity),
-                                   std::pair(Start::Of::kAcceleration, &out->by_acceleration)}) {
-    matrix->resize(n, n);
+  std::vector<exact::Dual> forces, reactions;
+  for (const auto& [of, matrix] :
+       {std::pair(Start::Of::kPosition, &ForceSlopes::by_position),
+        std::pair(Start::Of::kVelocity, &ForceSlopes::by_velocity),
+        std::pair(Start::Of::kAcceleration, &ForceSlopes::by_acceleration)}) {
     start.of = of;
     for (Eigen::Index k = 0; k < n; ++k) {
       start.varied = static_cast<int>(k);
-      if (std::string trouble = prover.Evaluate(start, &forces); !trouble.empty()) return trouble;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const exact::Dual& force = forces[static_cast<size_t>(i)];
-        out->force[i] = force.x;
-        (*matrix)(i, k) = force.d;
+      if (std::string trouble = prover.Evaluate(start, &forces, &reactions); !trouble.empty()) {
+        return trouble;
+      }
+      for (const auto& [values, slopes] :
+           {std::pair(&forces, static_cast<ForceSlopes*>(out)), {&reactions, &out->reactions}}) {
+        const auto rows = static_cast<Eigen::Index>(values->size());
+        slopes->force.resize(rows);
+        MatX& by = slopes->*matrix;
+        by.resize(rows, n);
+        for (Eigen::Index i = 0; i < rows; ++i) {
+          const exact::Dual& force = (*values)[static_cast<size_t>(i)];
+          slopes->force[i] = force.x;
+          by(i, k) = force.d;
+        }
       }
     }
   }

@@ -23,6 +23,7 @@
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "reference/reduced_model.h"
 
 namespace mbv {
 
@@ -112,9 +113,11 @@ struct CertifiedTrace {
 
 /// Of the forces along the commands, as coordinates q, that hold a state q, v, a (`command`):
 /// values, ∂f/∂q, ∂f/∂v and ∂f/∂a, columns per coordinate.
-struct ExactDerivatives {
-  VecX force;
-  MatX by_position, by_velocity, by_acceleration;
+struct ExactDerivatives : ForceSlopes {
+  /// As an input: forces of drives and prescribed joints instead, which have to be unique.
+  bool of_drives = false;
+  /// Joints · 6, under these forces; of redundant constraints some that balance.
+  ForceSlopes reactions;
 };
 /// By the same evaluator in dual numbers: as far as doubles go, nothing is enclosed. Near the poses
 /// `near`. Why there are none, or "". Slopes of loads that are expressions are extrapolated

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <functional>
 #include <memory>
 
@@ -16,6 +15,7 @@
 #include "comparison/verdict.h"
 #include "features/run/run_scenario.h"
 #include "report/page.h"
+#include "verify/program_call.h"
 
 namespace mbv {
 namespace {
@@ -118,13 +118,6 @@ Table RowTable(const Rows& rows, const std::string& scenario) {
   return table;
 }
 
-// A word that names a file here names it anywhere: the program runs in another folder.
-std::string Placed(const std::string& word) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(word, error)) return word;
-  return std::filesystem::absolute(word).string();
-}
-
 }  // namespace
 
 std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines) {
@@ -133,12 +126,8 @@ std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines) {
     const auto named = SplitSet(engine);
     if (!named) return {};
     std::string words;
-    for (size_t at = 0; at < named->second.size();) {
-      const size_t end = std::min(named->second.find(' ', at), named->second.size());
-      if (end > at)
-        words += fmt::format("{}\"{}\"", words.empty() ? "" : ", ",
-                             Placed(named->second.substr(at, end - at)));
-      at = end + 1;
+    for (const std::string& word : CommandWords(named->second)) {
+      words += fmt::format("{}\"{}\"", words.empty() ? "" : ", ", word);
     }
     text += fmt::format("{}{}: {{command: [{}]}}", text.empty() ? "" : ", ", named->first, words);
   }

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -17,8 +19,9 @@
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
 #include "math/ridders.h"
+#include "mechanism/channels.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/reach.h"
-#include "simulation/engine/engine_derivatives.h"
 
 namespace mbv {
 namespace {
@@ -35,36 +38,102 @@ constexpr double kBalanced = 1e-12;   // of the largest force
 constexpr double kLeastShare = 1e-6;  // of weights: a scale where no force is
 constexpr double kOfDistance = 0.2;   // of the smallest singular value
 constexpr double kFirstStep = 0.01;   // of differences, in units of lengths and angles
+constexpr double kAtHome = 1e-12;     // of prescribed joints, in their units
+constexpr double kSamePose = 1e-6;    // of a motion's pose reached by other coordinates
 
 }  // namespace
 
-double DerivativeScales::Largest(const MatX& x, const VecX& unit) {
-  return x.size() == 0 ? 0.0 : x.cwiseProduct(unit * unit.transpose()).cwiseAbs().maxCoeff();
+double DerivativeScales::Largest(const MatX& x, const VecX& rows, const VecX& columns) {
+  return x.size() == 0 ? 0.0 : x.cwiseProduct(rows * columns.transpose()).cwiseAbs().maxCoeff();
 }
 
-DerivativeScales::DerivativeScales(const Mechanism& mechanism, const VecX& unit,
-                                   const ForceDerivatives& by, const VecX& force)
-    : unit_(unit), a_(Largest(by.by_acceleration, unit)) {
+DerivativeScales::DerivativeScales(const Mechanism& mechanism, VecX rows, VecX columns,
+                                   const ForceSlopes& by)
+    : rows_(std::move(rows)),
+      columns_(std::move(columns)),
+      a_(Largest(by.by_acceleration, rows_, columns_)) {
   double weight = 0.0;
   for (const Body& body : mechanism.bodies) weight += body.mass * mechanism.gravity_W.norm();
-  const double v = Largest(by.by_velocity, unit);
-  q_ = std::max({Largest(by.by_position, unit), a_ > 0.0 ? v * v / a_ : 0.0,
-                 force.cwiseProduct(unit).cwiseAbs().maxCoeff(),
+  const double v = Largest(by.by_velocity, rows_, columns_);
+  q_ = std::max({Largest(by.by_position, rows_, columns_), a_ > 0.0 ? v * v / a_ : 0.0,
+                 Largest(by.force, rows_, VecX::Ones(1)),
                  kLeastShare * std::max(weight * CharacteristicLength(mechanism), a_)});
   v_ = std::max(v, std::sqrt(q_ * a_));
 }
 
-double DerivativeScales::Error(const ForceDerivatives& by, const MatX& q, const MatX& v,
-                               const MatX& a) const {
+double DerivativeScales::Error(const ForceSlopes& by, const ForceSlopes& other) const {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   double most = 0.0;
-  for (const auto& [x, y, scale] :
-       {std::tuple(&q, &by.by_position, q_), std::tuple(&v, &by.by_velocity, v_),
-        std::tuple(&a, &by.by_acceleration, a_)}) {
-    const double off = (*x - *y).allFinite() ? Largest(*x - *y, unit_) : kNone;
+  for (const auto& [of, scale] :
+       {std::pair(&ForceSlopes::by_position, q_), std::pair(&ForceSlopes::by_velocity, v_),
+        std::pair(&ForceSlopes::by_acceleration, a_)}) {
+    const MatX apart = other.*of - by.*of;
+    const double off = apart.allFinite() ? Largest(apart, rows_, columns_) : kNone;
     if (off > 0.0) most = std::max(most, scale > 0.0 ? off / scale : kNone);
   }
   return most;
+}
+
+void DerivativeScales::Raise(const DerivativeScales& other) {
+  q_ = std::max(q_, other.q_), v_ = std::max(v_, other.v_), a_ = std::max(a_, other.a_);
+}
+
+std::vector<std::string> JudgedForces::NotUnique(const Mechanism& mechanism) const {
+  std::vector<std::string> names;
+  for (size_t i = 0; i < by.unique.size(); ++i) {
+    if (by.unique[i]) continue;
+    names.push_back(
+        ChannelName(Quantity::kReaction, mechanism.joints[i / 6].name, static_cast<int>(i % 6)));
+  }
+  return names;
+}
+
+double EveryForceError(const Mechanism& mechanism, const VecX& columns, const EveryForce& by,
+                       const ForceSlopes& acting, const ForceSlopes& reactions) {
+  // Forces in lengths, so that they weigh as moments do.
+  const double length = CharacteristicLength(mechanism);
+  VecX rows = columns;
+  if (by.of_drives) {
+    rows.setOnes(by.acting.force.size());
+    const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
+    for (Eigen::Index i = 0; i < rows.size(); ++i) {
+      const auto kind = i < drives ? Coordinate::Kind::kDrive : Coordinate::Kind::kPrescribed;
+      const Eigen::Index index = i < drives ? i : i - drives;
+      if (IsLength(mechanism, {kind, static_cast<int>(index), 0})) rows[i] = length;
+    }
+  }
+  VecX counted = VecX::Zero(by.reactions.force.size());
+  for (Eigen::Index i = 0; i < counted.size(); ++i) {
+    if (by.unique[static_cast<size_t>(i)]) counted[i] = i % 6 < 3 ? length : 1.0;
+  }
+  // Reactions are no smaller than what acts.
+  const DerivativeScales of_acting(mechanism, rows, columns, by.acting);
+  DerivativeScales of_reactions(mechanism, counted, columns, by.reactions);
+  of_reactions.Raise(of_acting);
+  return std::max(of_acting.Error(by.acting, acting), of_reactions.Error(by.reactions, reactions));
+}
+
+std::string JudgeEveryForce(const Mechanism& mechanism, const Motion& motion, const VecX& columns,
+                            const CommandSample& command, const MatX& T, ReducedModel* model,
+                            JudgedForces* out) {
+  if (RunSummary summary = model->AllDerivatives(T, command.loads, &out->by); !summary.ok()) {
+    return summary.message;
+  }
+  ExactDerivatives dual;
+  dual.of_drives = out->by.of_drives;
+  const std::string trouble =
+      DifferentiateExactly(mechanism, motion, model->states(), command, &dual);
+  if (!trouble.empty()) return trouble;
+  const Eigen::Index n = columns.size();
+  for (ForceSlopes* of : {static_cast<ForceSlopes*>(&dual), &dual.reactions}) {
+    for (MatX* by : {&of->by_position, &of->by_velocity, &of->by_acceleration}) {
+      *by = by->topLeftCorner(of == &dual.reactions ? by->rows() : out->by.acting.force.size(), n)
+                .eval();
+    }
+  }
+  out->dual_error = EveryForceError(mechanism, columns, out->by, dual, dual.reactions);
+  out->dual_limit = DualLimit(std::min(model->sample().control, out->by.control));
+  return "";
 }
 
 double DualLimit(double control) {
@@ -85,6 +154,7 @@ class Lineariser {
       Assemble();
       FindModes();
       Check();
+      AskProgram();
       AskEngine();
     }
     return std::move(out_);
@@ -161,8 +231,8 @@ class Lineariser {
     RunSummary summary = model_->Move(q, v, a);
     if (summary.ok()) summary = model_->Motions(&T_);
     if (!summary.ok()) return Refuse(summary);
-    *f = model_->Forces(T_, {});
-    return true;
+    summary = model_->ForcesOf(T_, command_.loads, f);
+    return summary.ok() || Refuse(summary);
   }
 
   [[nodiscard]] VecX Size(const VecX& f) const { return f.cwiseProduct(unit_); }
@@ -171,7 +241,9 @@ class Lineariser {
     VecX f;
     const VecX none = VecX::Zero(n_);
     model_->Explain(false);
-    if (!MoveTo(q_, v_, none, &f)) return false;
+    VecX asked = none;  // accelerations that the drives hold
+    if (settings_.motion != nullptr && !Follow(&asked)) return false;
+    if (!MoveTo(q_, v_, asked, &f)) return false;
     if (settings_.equilibrium && !Settle(&f)) return false;
     MatX rates = model_->DriveRates(T_);
     if (!forces_given_) {
@@ -181,7 +253,7 @@ class Lineariser {
     }
     const VecX rest = rates.transpose() * out_.drive_force - f;
     ForceDerivatives slopes;
-    if (RunSummary summary = model_->Derivatives(T_, {}, &slopes); !summary.ok()) {
+    if (RunSummary summary = model_->Derivatives(T_, command_.loads, &slopes); !summary.ok()) {
       return Refuse(summary);
     }
     // Where all forces vanish: beside what a radian, or a characteristic length, makes of them.
@@ -190,10 +262,9 @@ class Lineariser {
                   Size(rates.transpose() * out_.drive_force).cwiseAbs().maxCoeff(),
                   Largest(StiffnessOf(slopes))});
     out_.imbalance = largest > 0.0 ? Size(rest).cwiseAbs().maxCoeff() / largest : 0.0;
-    VecX a = none;
+    VecX a = asked;
     if (out_.imbalance > kBalanced) {
-      const RunSummary summary = model_->Accelerations(T_, {}, out_.drive_force, &a);
-      if (!summary.ok()) return Refuse(summary);
+      if (!Accelerate(rest, slopes, &a)) return false;
       out_.notes.push_back(fmt::format(
           "the state is no equilibrium: what the drives leave of the forces accelerates it ({:.2g} "
           "of the largest); --equilibrium searches one near it",
@@ -201,6 +272,81 @@ class Lineariser {
     }
     out_.q = q_, out_.v = v_, out_.a = a;
     return MoveTo(q_, v_, a, &f);
+  }
+
+  // Newton's method on f(q, v, a) = J_dᵀ τ from there, one step but for friction by load.
+  bool Accelerate(VecX rest, ForceDerivatives slopes, VecX* a) {
+    double last = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < kMostSteps; ++k) {
+      MotionDerivatives motion;
+      if (!MakeMotionDerivatives(slopes, out_.drive_force, &motion)) {
+        return Refuse("a motion of the coordinates moves no mass", "other --coordinates");
+      }
+      const MatX& M = slopes.by_acceleration;
+      *a += M.partialPivLu().solve(rest);
+      if (model_->friction_by_load() == nullptr) return true;
+      VecX f;
+      if (!MoveTo(q_, v_, *a, &f)) return false;
+      rest = model_->DriveRates(T_).transpose() * out_.drive_force - f;
+      const double now = Size(rest).norm();
+      if (now == 0.0 || !(now < 0.5 * last)) return true;
+      last = now;
+      if (RunSummary summary = model_->Derivatives(T_, command_.loads, &slopes); !summary.ok()) {
+        return Refuse(summary);
+      }
+    }
+    return Refuse("accelerations under friction by load are not found", "other forces");
+  }
+
+  // To the motion's instant, sample by sample: the loops keep their assembly.
+  bool Follow(VecX* a) {
+    const Motion& motion = *settings_.motion;
+    if (motion.free()) {
+      return Refuse("a free motion has no state before it is integrated", "--at and --rate");
+    }
+    if (!(settings_.time_s >= 0.0 && settings_.time_s <= motion.duration_s)) {
+      return Refuse(fmt::format("--time {:g} is outside the motion, 0 … {:g} s", settings_.time_s,
+                                motion.duration_s),
+                    "");
+    }
+    if (settings_.equilibrium) return Refuse("--equilibrium: the scenario gives the state", "");
+    ReducedModel along(mechanism_, motion.commands);
+    along.Explain(false);
+    std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
+    std::erase_if(times, [&](double t) { return t >= settings_.time_s; });
+    times.push_back(settings_.time_s);
+    VecX near = q_;
+    for (const double t : times) {
+      EvaluateMotion(motion, t, &command_);
+      RunSummary summary = along.Move(command_.position, command_.velocity, command_.acceleration);
+      if (!summary.ok()) return Refuse(summary);
+      const BodyStates& states = along.states();
+      for (const NamedCoordinate& held : out_.held) {
+        const ScalarRow row = CoordinateRow(mechanism_, held.coordinate, states, 0.0);
+        const double home = HomeValue(mechanism_, held.coordinate);
+        if (std::abs(row.value - home) + std::abs(RateOf(row, states.V_WB)) > kAtHome) {
+          return Refuse("prescribed joint '" + held.name + "' moves in this scenario",
+                        "run SCENARIO --derivatives compares derivatives along such motions");
+        }
+      }
+      for (Eigen::Index k = 0; k < n_; ++k) {
+        const Coordinate& of = out_.coordinates[static_cast<size_t>(k)].coordinate;
+        const ScalarRow row = CoordinateRow(mechanism_, of, states, near[k]);
+        near[k] = q_[k] = row.value, v_[k] = RateOf(row, states.V_WB);
+        (*a)[k] = RateOf(row, states.A_WB) + row.bias;
+      }
+      summary = model_->Move(q_, v_, *a);
+      if (!summary.ok()) return Refuse(summary);
+    }
+    for (size_t b = 0; b < mechanism_.bodies.size(); ++b) {
+      const Pose apart = along.states().X_WB[b].inverse() * model_->states().X_WB[b];
+      if (!apart.isApprox(Pose::Identity(), kSamePose)) {
+        return Refuse("these coordinates lead to another assembly than the motion",
+                      "other --coordinates");
+      }
+    }
+    command_.time_s = settings_.time_s;
+    return true;
   }
 
   // Newton's method on J_dᵀ τ = f(q, 0, 0), steps halved until less is out of balance.
@@ -219,7 +365,7 @@ class Lineariser {
     double size = Size(rest).norm(), scale = std::max(size, Size(*f).norm());
     for (int k = 0; k < kMostSteps && size > kBalanced * scale; ++k) {
       ForceDerivatives slopes;
-      if (RunSummary summary = model_->Derivatives(T_, {}, &slopes); !summary.ok()) {
+      if (RunSummary summary = model_->Derivatives(T_, command_.loads, &slopes); !summary.ok()) {
         return Refuse(summary);
       }
       const MatX scaled = unit_.asDiagonal() * StiffnessOf(slopes) * unit_.asDiagonal();
@@ -235,7 +381,7 @@ class Lineariser {
           (void)MoveTo(q_, none, none, f);
           continue;
         }
-        *f = model_->Forces(T_, {});
+        if (!model_->ForcesOf(T_, command_.loads, f).ok()) continue;
         const VecX left = open();
         if (!(Size(left).norm() < size)) continue;
         rest = left, size = Size(rest).norm(), q_ = next, better = true;
@@ -261,7 +407,7 @@ class Lineariser {
 
   bool Differentiate() {
     out_.control = model_->sample().control;
-    RunSummary summary = model_->Derivatives(T_, {}, &out_.by_reference, true);
+    RunSummary summary = model_->Derivatives(T_, command_.loads, &out_.by_reference, true);
     if (!summary.ok()) return Refuse(summary);
     // Commands that hold the state, with the joints that are held.
     Motion motion;
@@ -271,7 +417,7 @@ class Lineariser {
       }
     }
     const auto all = static_cast<Eigen::Index>(motion.commands.size());
-    CommandSample command;
+    CommandSample& command = command_;
     for (const auto& [into, from] : {std::pair(&command.position, &out_.q),
                                      {&command.velocity, &out_.v},
                                      {&command.acceleration, &out_.a}}) {
@@ -282,28 +428,40 @@ class Lineariser {
       command.position[k] =
           HomeValue(mechanism_, out_.held[static_cast<size_t>(k - n_)].coordinate);
     }
-    ExactDerivatives& dual = out_.by_dual_numbers;
-    const std::string trouble =
-        DifferentiateExactly(mechanism_, motion, model_->states(), command, &dual);
-    if (!trouble.empty()) return Refuse("by dual numbers: " + trouble, "a state farther from it");
-    for (MatX* matrix : {&dual.by_position, &dual.by_velocity, &dual.by_acceleration}) {
-      *matrix = matrix->topLeftCorner(n_, n_).eval();
+    out_.no_every = JudgeEveryForce(mechanism_, motion, unit_, command, T_, &*model_, &out_.every);
+    out_.not_unique = out_.every.NotUnique(mechanism_);
+    if (model_->friction_by_load() == nullptr) {
+      ExactDerivatives& dual = out_.by_dual_numbers;
+      const std::string trouble =
+          DifferentiateExactly(mechanism_, motion, model_->states(), command, &dual);
+      if (!trouble.empty()) return Refuse("by dual numbers: " + trouble, "a state farther from it");
+      for (MatX* matrix : {&dual.by_position, &dual.by_velocity, &dual.by_acceleration}) {
+        *matrix = matrix->topLeftCorner(n_, n_).eval();
+      }
+    } else if (!out_.no_every.empty()) {
+      return Refuse(out_.no_every, "");
+    } else {
+      out_.notes.emplace_back(
+          "friction grows with loads: f = J_dᵀ τ, and dual numbers judge the drive forces τ");
     }
-    dual.force.conservativeResize(n_);
     TakeDifferences();
     return true;
   }
 
   void TakeDifferences() {
     VecX q = out_.q, v = out_.v, a = out_.a;
-    ForceDerivatives& by = out_.by_differences;
+    const EveryForce& every = out_.every.by;
+    const Eigen::Index acting = every.acting.force.size(), reactions = every.reactions.force.size();
     const double speed = std::max(1.0, v.cwiseQuotient(unit_).cwiseAbs().maxCoeff());
+    const bool spins = !IdleSpins(mechanism_).empty();
     // Where loops are nearly singular forces change within that distance.
-    const double near = std::min(kFirstStep, kOfDistance * out_.control);
+    const double control = std::fmin(out_.control, every.control);
+    const double near = std::min(kFirstStep, kOfDistance * control);
     for (const auto& [of, matrix, step] :
-         {std::tuple(&q, &by.by_position, near), std::tuple(&v, &by.by_velocity, 0.1 * speed),
-          std::tuple(&a, &by.by_acceleration, speed * speed)}) {
-      matrix->resize(n_, n_);
+         {std::tuple(&q, &ForceSlopes::by_position, near),
+          std::tuple(&v, &ForceSlopes::by_velocity, 0.1 * speed),
+          std::tuple(&a, &ForceSlopes::by_acceleration, speed * speed)}) {
+      MatX slopes(n_ + acting + reactions, n_);
       for (Eigen::Index k = 0; k < n_; ++k) {
         const double at = (*of)[k];
         double most = step * unit_[k];
@@ -311,14 +469,19 @@ class Lineariser {
           (void)ForceAt(q, v, a);  // the state itself
           most = SlidingStep(k, most);
         }
-        matrix->col(k) = SlopesAt(
+        slopes.col(k) = SlopesAt(
             [&, of = of](double x) {
+              // Turns of idle spins follow from the way.
+              if (spins) (void)ForceAt(out_.q, out_.v, out_.a);
               (*of)[k] = x;
               return ForceAt(q, v, a);
             },
             at, most);
         (*of)[k] = at;
       }
+      out_.by_differences.*matrix = slopes.topRows(n_);
+      by_differences_[0].*matrix = slopes.middleRows(n_, acting);
+      by_differences_[1].*matrix = slopes.bottomRows(reactions);
     }
     (void)ForceAt(q, v, a);
   }
@@ -338,29 +501,57 @@ class Lineariser {
     }
     return step;
   }
+  // f, then what acts and reactions; of those that are not unique nothing.
   VecX ForceAt(const VecX& q, const VecX& v, const VecX& a) {
+    const EveryForce& known = out_.every.by;
+    const Eigen::Index acting = known.acting.force.size(), reactions = known.reactions.force.size();
+    VecX all = VecX::Constant(n_ + acting + reactions, kNan), f;
     MatX T;
-    if (!model_->Move(q, v, a).ok() || !model_->Motions(&T).ok()) return VecX::Constant(n_, kNan);
-    return model_->Forces(T, {});
+    if (!model_->Move(q, v, a).ok() || !model_->Motions(&T).ok() ||
+        !model_->ForcesOf(T, command_.loads, &f).ok()) {
+      return all;
+    }
+    all.head(n_) = f;
+    if (!out_.no_every.empty()) return all;
+    EveryForce there;
+    there.of_drives = known.of_drives;
+    if (!model_->EachForce(T, command_.loads, &there).ok()) return all;
+    all.segment(n_, acting) = there.acting.force;
+    for (Eigen::Index i = 0; i < reactions; ++i) {
+      const bool unique = known.unique[static_cast<size_t>(i)];
+      all[n_ + acting + i] = unique ? there.reactions.force[i] : 0.0;
+    }
+    return all;
   }
 
-  [[nodiscard]] double Largest(const MatX& x) const { return DerivativeScales::Largest(x, unit_); }
+  [[nodiscard]] double Largest(const MatX& x) const {
+    return DerivativeScales::Largest(x, unit_, unit_);
+  }
 
   void Compare() {
     const ForceDerivatives& by = out_.by_reference;
-    const ExactDerivatives& dual = out_.by_dual_numbers;
-    const DerivativeScales scales(mechanism_, unit_, by, dual.force);
-    out_.dual_error = scales.Error(by, dual.by_position, dual.by_velocity, dual.by_acceleration);
-    const ForceDerivatives& differences = out_.by_differences;
-    out_.difference_error = scales.Error(by, differences.by_position, differences.by_velocity,
-                                         differences.by_acceleration);
+    const DerivativeScales scales(mechanism_, unit_, unit_, by);
+    out_.difference_error = scales.Error(by, out_.by_differences);
     out_.dual_limit = DualLimit(out_.control);
+    JudgedForces& every = out_.every;
+    if (out_.no_every.empty()) {
+      every.difference_limit = kDifferenceLimit - kDualLimit + every.dual_limit;
+      every.difference_error =
+          EveryForceError(mechanism_, unit_, every.by, by_differences_[0], by_differences_[1]);
+    }
+    if (model_->friction_by_load() == nullptr) {
+      out_.dual_error = scales.Error(by, out_.by_dual_numbers);
+    } else {
+      out_.dual_error = every.dual_error, out_.dual_limit = every.dual_limit;
+    }
     out_.difference_limit = kDifferenceLimit - kDualLimit + out_.dual_limit;
   }
 
   void Assemble() {
     const ForceDerivatives& by = out_.by_reference;
-    out_.mass = 0.5 * (by.by_acceleration + by.by_acceleration.transpose());
+    symmetric_ = model_->friction_by_load() == nullptr;
+    out_.mass = by.by_acceleration;
+    if (symmetric_) out_.mass = (0.5 * (out_.mass + out_.mass.transpose())).eval();
     out_.K = StiffnessOf(by);
     out_.D = by.by_velocity;
     MotionDerivatives motion;
@@ -369,22 +560,46 @@ class Lineariser {
       out_.notes.emplace_back("a motion of the coordinates moves no mass: there is no A, no mode");
       return;
     }
-    const Eigen::LLT<MatX> mass(out_.mass);
     out_.A = MatX::Zero(2 * n_, 2 * n_);
     out_.A.topRightCorner(n_, n_).setIdentity();
     out_.A.bottomLeftCorner(n_, n_) = motion.by_position;
     if (stiffness_.size() > 0) {
       out_.A.bottomLeftCorner(n_, n_) -=
-          mass.solve(MatX(by.drive_rates.transpose() * stiffness_.asDiagonal() * by.drive_rates));
+          OverMass(by.drive_rates.transpose() * stiffness_.asDiagonal() * by.drive_rates);
     }
     out_.A.bottomRightCorner(n_, n_) = motion.by_velocity;
     out_.B = MatX::Zero(2 * n_, motion.by_force.cols());
     out_.B.bottomRows(n_) = motion.by_force;
   }
 
-  // With M = L Lᵀ and y = Lᵀ δq; without damping −λ² are the eigenvalues of L⁻¹ K L⁻ᵀ.
+  [[nodiscard]] MatX OverMass(const MatX& of) const { return out_.mass.partialPivLu().solve(of); }
+
+  // Of M that friction by load makes unsymmetric: eigenvalues of A, q in units.
+  void FindModesOfA() {
+    const Eigen::EigenSolver<MatX> eigen(InUnits("A", out_.A));
+    for (Eigen::Index k = 0; k < 2 * n_; ++k) {
+      const std::complex<double> root = eigen.eigenvalues()[k];
+      if (root.imag() < 0.0) continue;
+      AddMode(root, unit_.cast<std::complex<double>>().asDiagonal() *
+                        eigen.eigenvectors().col(k).head(n_));
+    }
+  }
+
   void FindModes() {
     if (!regular_) return;
+    if (symmetric_) {
+      FindModesOfMass();
+    } else {
+      FindModesOfA();
+    }
+    std::ranges::stable_sort(out_.modes, {}, [](const VibrationMode& m) {
+      return std::pair(m.frequency_hz, -m.eigenvalue.real());
+    });
+    for (VibrationMode& mode : out_.modes) Move(&mode);
+  }
+
+  // With M = L Lᵀ and y = Lᵀ δq; without damping −λ² are the eigenvalues of L⁻¹ K L⁻ᵀ.
+  void FindModesOfMass() {
     const Eigen::LLT<MatX> mass(out_.mass);
     const auto turned = [&](const MatX& by) {
       const MatX left = mass.matrixL().solve(by);
@@ -417,10 +632,6 @@ class Lineariser {
                           std::complex<double>(0.0, 1.0) * mass.matrixU().solve(y.imag()).eval());
       }
     }
-    std::ranges::stable_sort(out_.modes, {}, [](const VibrationMode& m) {
-      return std::pair(m.frequency_hz, -m.eigenvalue.real());
-    });
-    for (VibrationMode& mode : out_.modes) Move(&mode);
   }
 
   void AddMode(const std::complex<double>& root, const Eigen::VectorXcd& shape) {
@@ -462,40 +673,26 @@ class Lineariser {
     mode->X_WB.clear();
   }
 
-  // At rest, where MuJoCo's coordinates vary as the loops let them.
+  // mjd_transitionFD at rest, where MuJoCo's coordinates vary as the loops let them.
   void AskEngine() {
     if (!settings_.mujoco || !regular_) return;
     MatX T;
     RunSummary moved = model_->Move(out_.q, VecX::Zero(n_), VecX::Zero(n_));
     if (moved.ok()) moved = model_->Motions(&T);
-    for (const bool soft : {true, false}) {
-      EngineDerivative engine{.softness =
-                                  soft ? "default softness" : "as stiff as its step allows"};
-      if (!v_.isZero(0.0)) engine.why_not = "the state is in motion";
-      if (stiffness_.size() > 0) engine.why_not = "drives hold their place";
-      if (!moved.ok()) engine.why_not = moved.message;
-      if (out_.A.bottomLeftCorner(n_, n_).isZero(0.0)) engine.why_not = "∂a/∂q vanishes";
-      if (engine.why_not.empty()) {
-        const EngineDerivatives by =
-            DifferentiateEngine(mechanism_, model_->states().X_WB, T, out_.drive_force, soft);
-        if (by.summary.ok()) {
-          const MatX q = out_.A.bottomLeftCorner(n_, n_), v = out_.A.bottomRightCorner(n_, n_);
-          const double fast = std::sqrt(InAccelerations(q).cwiseAbs().maxCoeff());
-          const auto apart = [&](const MatX& x, const MatX& y, double least) {
-            return InAccelerations(x - y).cwiseAbs().maxCoeff() /
-                   std::max(InAccelerations(y).cwiseAbs().maxCoeff(), least);
-          };
-          engine.position_error = apart(by.by_position, q, 0.0);
-          engine.velocity_error = apart(by.by_velocity, v, fast);
-        } else {
-          engine.why_not = by.summary.message;
-        }
-      }
-      out_.engines.push_back(std::move(engine));
+    std::string why_not = moved.ok() ? "" : moved.message;
+    if (!v_.isZero(0.0)) why_not = "the state is in motion";
+    if (stiffness_.size() > 0) why_not = "drives hold their place";
+    if (!command_.loads.empty()) why_not = "loads act";
+    if (out_.A.bottomLeftCorner(n_, n_).isZero(0.0)) why_not = "∂a/∂q vanishes";
+    if (why_not.empty()) {
+      out_.engines = AskMujoco(mechanism_, out_, model_->states(), T, unit_);
+    } else {
+      out_.engines.push_back(
+          {.engine = "MuJoCo 2.2.2", .softness = "mjd_transitionFD", .why_not = why_not});
     }
-  }
-  [[nodiscard]] MatX InAccelerations(const MatX& x) const {
-    return unit_.cwiseInverse().asDiagonal() * x * unit_.asDiagonal();
+    if (command_.loads.empty()) {
+      out_.engines.push_back(AskCorrectedMujoco(mechanism_, out_, unit_, &*model_));
+    }
   }
 
   // The user's matrices.
@@ -506,7 +703,27 @@ class Lineariser {
     };
     const auto text = ReadWholeFile(settings_.check);
     if (!text) return refuse("cannot be read", "a JSON file");
-    const auto json = nlohmann::json::parse(*text, nullptr, false, true);
+    JudgeAll("yours", *text, refuse);
+  }
+
+  // Those of a program, which is not judged where it does not answer in order.
+  void AskProgram() {
+    if (settings_.program.empty()) return;
+    std::string text;
+    std::string& trouble = out_.program_trouble;
+    trouble = DerivativesOfProgram(settings_.program, mechanism_, out_, model_->states(),
+                                   command_.loads, &text);
+    if (!trouble.empty()) return;
+    const std::vector<DerivativeCheck> before = out_.checks;
+    JudgeAll(settings_.program, text, [&](const std::string& message, const std::string&) {
+      trouble += (trouble.empty() ? "" : "; ") + message;
+    });
+    if (!trouble.empty()) out_.checks = before;
+  }
+
+  template <typename Refuse>
+  void JudgeAll(const std::string& who, const std::string& text, const Refuse& refuse) {
+    const auto json = nlohmann::json::parse(text, nullptr, false, true);
     const char* expected =
         "{\"coordinates\": [names], \"f_q\": [[row], …]} with any of f_q, f_v, f_a (n × n), A (2n "
         "× 2n) and B (2n × drives)";
@@ -518,18 +735,18 @@ class Lineariser {
                       "the same in this order, or --coordinates");
       }
     }
-    const MatX none;
     const ForceDerivatives& by = out_.by_reference;
     const std::vector<std::pair<std::string, const MatX*>> known = {{"f_q", &by.by_position},
                                                                     {"f_v", &by.by_velocity},
                                                                     {"f_a", &by.by_acceleration},
                                                                     {"A", &out_.A},
                                                                     {"B", &out_.B}};
+    size_t judged = 0, wrong = 0;
     for (const auto& [key, value] : json.items()) {
       if (key == "coordinates") continue;
       const auto of = std::ranges::find(known, key, &std::pair<std::string, const MatX*>::first);
       if (of == known.end()) {
-        refuse("there is no matrix '" + key + "'", expected);
+        refuse("there is no matrix '" + key + "'", expected), ++wrong;
         continue;
       }
       MatX theirs;
@@ -537,13 +754,13 @@ class Lineariser {
         refuse(fmt::format("{}: {} rows of {} finite numbers are needed", key, of->second->rows(),
                            of->second->cols()),
                expected);
+        ++wrong;
         continue;
       }
-      Judge(key, theirs, *of->second);
+      Judge(who, key, theirs, *of->second);
+      ++judged;
     }
-    if (out_.checks.empty() && !out_.diagnostics.has_errors()) {
-      refuse("has none of the matrices", expected);
-    }
+    if (judged + wrong == 0) refuse("has none of the matrices", expected);
   }
 
   static bool ReadMatrix(const nlohmann::json& rows, Eigen::Index m, Eigen::Index n, MatX* out) {
@@ -578,16 +795,15 @@ class Lineariser {
     if (key == "f_v") return term.by_velocity;
     if (key != "A") return {};
     MatX of = MatX::Zero(2 * n_, 2 * n_);
-    const Eigen::LLT<MatX> mass(out_.mass);
-    of.bottomLeftCorner(n_, n_) = -mass.solve(term.by_position);
-    of.bottomRightCorner(n_, n_) = -mass.solve(term.by_velocity);
+    of.bottomLeftCorner(n_, n_) = -OverMass(term.by_position);
+    of.bottomRightCorner(n_, n_) = -OverMass(term.by_velocity);
     return of;
   }
 
-  void Judge(const std::string& key, const MatX& theirs, const MatX& ours) {
+  void Judge(const std::string& who, const std::string& key, const MatX& theirs, const MatX& ours) {
     const MatX off = InUnits(key, theirs - ours);
     const double largest = InUnits(key, ours).cwiseAbs().maxCoeff();
-    DerivativeCheck check{.matrix = key, .error = 0.0, .explained = ""};
+    DerivativeCheck check{.of = who, .matrix = key, .error = 0.0, .explained = ""};
     const double most = off.size() == 0 ? 0.0 : off.cwiseAbs().maxCoeff();
     if (most > 0.0) check.error = largest > 0.0 ? most / largest : kInfinity;
     if (check.error > out_.check_limit) {
@@ -614,7 +830,9 @@ class Lineariser {
   Eigen::Index n_ = 0;
   VecX unit_, q_, v_, stiffness_;
   MatX T_;
-  bool forces_given_ = false, regular_ = false;
+  bool forces_given_ = false, regular_ = false, symmetric_ = true;
+  CommandSample command_;                      ///< of the state, with its loads
+  std::array<ForceSlopes, 2> by_differences_;  ///< of what acts, of reactions
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "base/text.h"
 #include "features/linearise/linearise.h"
+#include "mechanism/channels.h"
 #include "report/html_report.h"
 #include "report/page.h"
 #include "verify/pictures.h"
@@ -109,20 +110,33 @@ Table WitnessTable(const Linearisation& result) {
       row("dual numbers through the second evaluator", result.dual_error, result.dual_limit));
   table.rows.push_back(row("extrapolated differences of the reference's forces",
                            result.difference_error, result.difference_limit));
+  if (result.no_every.empty()) {
+    table.rows.push_back(row("dual numbers, of drive forces and reactions", result.every.dual_error,
+                             result.every.dual_limit));
+    table.rows.push_back(row("differences, of drive forces and reactions",
+                             result.every.difference_error, result.every.difference_limit));
+  } else {
+    table.rows.push_back(
+        {"drive forces and reactions: " + result.no_every, "–", "", Cell("none", Mark::kOff)});
+  }
   for (const DerivativeCheck& check : result.checks) {
     std::vector<Cell> cells = row("", check.error, result.check_limit);
-    cells[0] =
-        Cell("yours, " + check.matrix + (check.explained.empty() ? "" : ": " + check.explained));
+    cells[0] = Cell(check.of + ", " + check.matrix +
+                    (check.explained.empty() ? "" : ": " + check.explained));
     table.rows.push_back(std::move(cells));
   }
+  if (!result.program_trouble.empty()) {
+    table.rows.push_back(
+        {"your program: " + result.program_trouble, "–", "", Cell("not judged", Mark::kWarn)});
+  }
   for (const EngineDerivative& engine : result.engines) {
-    const std::string name = "MuJoCo's mjd_transitionFD, " + engine.softness;
+    const std::string name = engine.engine + ", " + engine.softness;
     if (!engine.why_not.empty()) {
       table.rows.push_back({name + ": " + engine.why_not, "–", "", Cell("none", Mark::kOff)});
       continue;
     }
-    for (const auto& [what, error] : {std::pair(": ∂a/∂q", engine.position_error),
-                                      std::pair(": ∂a/∂v", engine.velocity_error)}) {
+    for (const auto& [what, error] :
+         {std::pair(": ∂/∂q", engine.position_error), std::pair(": ∂/∂v", engine.velocity_error)}) {
       table.rows.push_back({name + what, fmt::format("{:.1e}", error), "", Cell("measured")});
     }
   }
@@ -135,11 +149,13 @@ std::string VerdictText(const Linearisation& result) {
   }
   for (const DerivativeCheck& check : result.checks) {
     if (check.error <= result.check_limit) continue;
-    return fmt::format("DISAGREE: {} is off by {:.2g} of its largest entry{}", check.matrix,
-                       check.error, check.explained.empty() ? "" : "; " + check.explained);
+    return fmt::format("DISAGREE: {} ({}) is off by {:.2g} of its largest entry{}", check.matrix,
+                       check.of, check.error,
+                       check.explained.empty() ? "" : "; " + check.explained);
   }
   return fmt::format("AGREE: derivatives computed {}",
-                     result.checks.empty() ? "three ways" : "three ways, and yours");
+                     result.checks.empty() ? "three ways" : "three ways, and yours") +
+         (result.program_trouble.empty() ? "" : "; the program is not judged");
 }
 
 std::vector<ReportSection> SectionsOf(const Linearisation& result, const Mechanism* mechanism) {
@@ -158,6 +174,18 @@ std::vector<ReportSection> SectionsOf(const Linearisation& result, const Mechani
   for (const std::string& note : result.notes) state.Add(Paragraph{note});
   ReportSection witnesses{.title = "How the derivatives were checked", .link = "Witnesses"};
   witnesses.Add(WitnessTable(result));
+  if (result.no_every.empty() && !result.every.by.of_drives) {
+    witnesses.Note(
+        "Drives are too few, or share their forces: reactions are those under forces along the "
+        "coordinates.");
+  }
+  if (!result.not_unique.empty()) {
+    witnesses.Note(
+        fmt::format("Redundant constraints share {} of {} components of reactions, which "
+                    "have no derivatives: {}.",
+                    result.not_unique.size(), result.every.by.unique.size(),
+                    Joined(result.not_unique, kMostNamed)));
+  }
   ReportSection matrices{.title = "Matrices", .link = "Matrices"};
   const std::vector<std::string> names = NamesOf(result.coordinates);
   const auto add = [&](const char* caption, const MatX& matrix) {
@@ -168,7 +196,9 @@ std::vector<ReportSection> SectionsOf(const Linearisation& result, const Mechani
   add("K = ∂f/∂q − ∂(J_dᵀ τ)/∂q: the stiffness that springs, weight, loops and motion give",
       result.K);
   add("D = ∂f/∂v", result.D);
-  matrices.Note("A and B, and what they are made of, are in linearise.json.");
+  matrices.Note(
+      "A and B, what they are made of, and the derivatives of drive forces and reactions are in "
+      "linearise.json.");
   return {modes, state, witnesses, matrices};
 }
 
@@ -185,6 +215,63 @@ Json VectorJson(const VecX& vector) {
   return std::vector<double>(vector.data(), vector.data() + vector.size());
 }
 Json NumberJson(double x) { return std::isfinite(x) ? Json(x) : Json(); }
+
+// Rows in the order of `channels`: reactions that are unique, then drives and prescribed joints
+// where these exert the forces.
+struct ForceRows {
+  std::vector<std::string> channels;
+  VecX value;
+  MatX by_position, by_velocity, by_acceleration;
+};
+ForceRows RowsOf(const Linearisation& result, const Mechanism& mechanism) {
+  ForceRows rows;
+  if (!result.no_every.empty()) return rows;
+  const EveryForce& by = result.every.by;
+  std::vector<std::pair<const ForceSlopes*, Eigen::Index>> from;
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    for (int c = 0; c < 6; ++c) {
+      if (!by.unique[6 * j + static_cast<size_t>(c)]) continue;
+      rows.channels.push_back(ChannelName(Quantity::kReaction, mechanism.joints[j].name, c));
+      from.emplace_back(&by.reactions, 6 * static_cast<Eigen::Index>(j) + c);
+    }
+  }
+  if (by.of_drives) {
+    for (const Drive& drive : mechanism.drives) {
+      rows.channels.push_back(ChannelName(Quantity::kForce, drive.name));
+    }
+    for (const Prescribed& prescribed : mechanism.prescribed) {
+      rows.channels.push_back(ChannelName(Quantity::kBaseForce, prescribed.name));
+    }
+    for (Eigen::Index i = 0; i < by.acting.force.size(); ++i) from.emplace_back(&by.acting, i);
+  }
+  const auto n = static_cast<Eigen::Index>(from.size());
+  rows.value.resize(n);
+  for (MatX* matrix : {&rows.by_position, &rows.by_velocity, &rows.by_acceleration}) {
+    matrix->resize(n, by.acting.by_position.cols());
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto& [of, row] = from[static_cast<size_t>(i)];
+    rows.value[i] = of->force[row];
+    rows.by_position.row(i) = of->by_position.row(row);
+    rows.by_velocity.row(i) = of->by_velocity.row(row);
+    rows.by_acceleration.row(i) = of->by_acceleration.row(row);
+  }
+  return rows;
+}
+
+Json ForcesJson(const Linearisation& result, const Mechanism& mechanism) {
+  const JudgedForces& every = result.every;
+  const ForceRows rows = RowsOf(result, mechanism);
+  return {{"why_not", result.no_every},
+          {"exerted_by", every.by.of_drives ? "drives" : "coordinates"},
+          {"channels", rows.channels},
+          {"value", VectorJson(rows.value)},
+          {"by_position", MatrixJson(rows.by_position)},
+          {"by_velocity", MatrixJson(rows.by_velocity)},
+          {"by_acceleration", MatrixJson(rows.by_acceleration)},
+          {"not_unique", result.not_unique},
+          {"control", NumberJson(every.by.control)}};
+}
 
 }  // namespace
 
@@ -228,8 +315,8 @@ std::string LinearisationPage(const Linearisation& result, const Mechanism& mech
   return page.Write(head);
 }
 
-std::string LinearisationJson(const Linearisation& result, const std::string& mechanism) {
-  Json json = {{"mechanism", mechanism},
+std::string LinearisationJson(const Linearisation& result, const Mechanism& mechanism) {
+  Json json = {{"mechanism", mechanism.name},
                {"agree", result.agrees()},
                {"verdict", VerdictText(result)},
                {"coordinates", NamesOf(result.coordinates)},
@@ -257,6 +344,7 @@ std::string LinearisationJson(const Linearisation& result, const std::string& me
                      {"f_v", MatrixJson(term.by_velocity)}});
   }
   json["terms"] = std::move(terms);
+  json["forces"] = ForcesJson(result, mechanism);
   Json modes = Json::array();
   for (const VibrationMode& mode : result.modes) {
     modes.push_back({{"frequency_hz", mode.frequency_hz},
@@ -273,17 +361,28 @@ std::string LinearisationJson(const Linearisation& result, const std::string& me
                        {{"name", "differences"},
                         {"error", NumberJson(result.difference_error)},
                         {"limit", result.difference_limit}}};
+  if (result.no_every.empty()) {
+    for (const auto& [name, error, limit] :
+         {std::tuple("dual_numbers_of_forces", result.every.dual_error, result.every.dual_limit),
+          std::tuple("differences_of_forces", result.every.difference_error,
+                     result.every.difference_limit)}) {
+      json["witnesses"].push_back({{"name", name}, {"error", NumberJson(error)}, {"limit", limit}});
+    }
+  }
   Json checks = Json::array();
   for (const DerivativeCheck& check : result.checks) {
-    checks.push_back({{"matrix", check.matrix},
+    checks.push_back({{"of", check.of},
+                      {"matrix", check.matrix},
                       {"error", NumberJson(check.error)},
                       {"limit", result.check_limit},
                       {"explained", check.explained}});
   }
   json["checks"] = std::move(checks);
+  json["program_trouble"] = result.program_trouble;
   Json engines = Json::array();
   for (const EngineDerivative& engine : result.engines) {
-    engines.push_back({{"softness", engine.softness},
+    engines.push_back({{"engine", engine.engine},
+                       {"softness", engine.softness},
                        {"position_error", NumberJson(engine.position_error)},
                        {"velocity_error", NumberJson(engine.velocity_error)},
                        {"why_not", engine.why_not}});
@@ -291,6 +390,49 @@ std::string LinearisationJson(const Linearisation& result, const std::string& me
   json["mujoco"] = std::move(engines);
   json["notes"] = result.notes;
   return json.dump(2);
+}
+
+DataMatrices LinearisationMatrices(const Linearisation& result, const Mechanism& mechanism) {
+  DataMatrices data;
+  data.about = {{"mechanism", mechanism.name},
+                {"verdict", VerdictText(result)},
+                {"exerted_by", result.every.by.of_drives ? "drives" : "coordinates"}};
+  const ForceRows rows = RowsOf(result, mechanism);
+  data.names = {{"coordinates", NamesOf(result.coordinates)},
+                {"drives", result.drives},
+                {"force_channels", rows.channels}};
+  const ForceDerivatives& by = result.by_reference;
+  const auto modes = static_cast<Eigen::Index>(result.modes.size());
+  MatX eigenvalues(modes, 2), real(result.q.size(), modes), imaginary(result.q.size(), modes);
+  VecX frequencies(modes);
+  for (Eigen::Index k = 0; k < modes; ++k) {
+    const VibrationMode& mode = result.modes[static_cast<size_t>(k)];
+    eigenvalues.row(k) << mode.eigenvalue.real(), mode.eigenvalue.imag();
+    frequencies[k] = mode.frequency_hz;
+    real.col(k) = mode.shape.real(), imaginary.col(k) = mode.shape.imag();
+  }
+  data.matrices = {{"A", result.A},
+                   {"B", result.B},
+                   {"M", result.mass},
+                   {"K", result.K},
+                   {"D", result.D},
+                   {"J_d", by.drive_rates},
+                   {"f_q", by.by_position},
+                   {"f_v", by.by_velocity},
+                   {"f_a", by.by_acceleration},
+                   {"position", result.q},
+                   {"rate", result.v},
+                   {"acceleration", result.a},
+                   {"drive_force", result.drive_force},
+                   {"force", rows.value},
+                   {"force_q", rows.by_position},
+                   {"force_v", rows.by_velocity},
+                   {"force_a", rows.by_acceleration},
+                   {"frequency_hz", frequencies},
+                   {"eigenvalue", eigenvalues},
+                   {"shape_real", real},
+                   {"shape_imaginary", imaginary}};
+  return data;
 }
 
 }  // namespace mbv

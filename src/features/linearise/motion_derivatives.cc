@@ -7,6 +7,7 @@
 #include <set>
 
 #include "base/json_text.h"
+#include "base/text.h"
 #include "features/linearise/linearise.h"
 #include "mechanism/reach.h"
 
@@ -14,25 +15,37 @@ namespace mbv {
 namespace {
 
 struct SampleDerivatives {
-  double time_s = kNan, error = kNan, limit = kNan, control = kNan;
+  double time_s = kNan, control = kNan;
+  /// Of the forces along the commands; NaN with friction by load, which depends on where forces
+  /// act.
+  double error = kNan, limit = kNan;
   std::string why_not = {};  ///< not empty: there are none
+  JudgedForces every = {};   ///< drive forces and reactions
+  std::string no_every = {};
 
-  [[nodiscard]] bool agrees() const { return error <= limit; }
+  [[nodiscard]] bool judged() const { return why_not.empty(); }
+  /// Of the limits, the larger one.
+  [[nodiscard]] double share() const {
+    return std::fmax(error / limit, no_every.empty() ? every.dual_error / every.dual_limit : kNan);
+  }
+  [[nodiscard]] bool agrees() const { return share() <= 1.0; }
+  [[nodiscard]] double worst() const {
+    return std::fmax(error, no_every.empty() ? every.dual_error : kNan);
+  }
 };
 
 struct SampledDerivatives {
   std::string why_not;  ///< not empty: the motion is of a kind that is not served
   std::vector<SampleDerivatives> samples;
+  std::vector<std::string> left_out;  ///< sentences
 
   [[nodiscard]] size_t computed() const {
-    return static_cast<size_t>(std::ranges::count_if(
-        samples, [](const SampleDerivatives& s) { return s.why_not.empty(); }));
+    return static_cast<size_t>(std::ranges::count_if(samples, &SampleDerivatives::judged));
   }
   [[nodiscard]] const SampleDerivatives* Worst() const {
     const SampleDerivatives* worst = nullptr;
     for (const SampleDerivatives& s : samples) {
-      if (!s.why_not.empty()) continue;
-      if (worst == nullptr || s.error / s.limit > worst->error / worst->limit) worst = &s;
+      if (s.judged() && (worst == nullptr || s.share() > worst->share())) worst = &s;
     }
     return worst;
   }
@@ -40,9 +53,11 @@ struct SampledDerivatives {
     const SampleDerivatives* worst = Worst();
     if (!why_not.empty()) return "there are no derivatives: " + why_not;
     if (worst == nullptr) return "there are no derivatives: " + samples.front().why_not;
-    return fmt::format("derivatives of forces {} to {:.1e} at {} of {} samples",
-                       worst->agrees() ? "agree" : "DISAGREE", worst->error, computed(),
-                       samples.size());
+    const bool reactions = std::ranges::any_of(
+        samples, [](const SampleDerivatives& s) { return s.judged() && s.no_every.empty(); });
+    return fmt::format("derivatives of forces{} {} to {:.1e} at {} of {} samples",
+                       reactions ? " and reactions" : "", worst->agrees() ? "agree" : "DISAGREE",
+                       worst->worst(), computed(), samples.size());
   }
 };
 
@@ -55,20 +70,54 @@ SampleDerivatives Differentiate(const Mechanism& mechanism, const Motion& motion
   if (summary.ok()) summary = model->Derivatives(T, command.loads, &by);
   sample.why_not = summary.message;
   if (!summary.ok()) return sample;
+  sample.no_every = JudgeEveryForce(mechanism, motion, unit, command, T, model, &sample.every);
+  if (model->friction_by_load() != nullptr) {
+    sample.why_not = sample.no_every;
+    return sample;
+  }
   ExactDerivatives dual;
   sample.why_not = DifferentiateExactly(mechanism, motion, model->states(), command, &dual);
   if (!sample.why_not.empty()) return sample;
-  const DerivativeScales scales(mechanism, unit, by, dual.force);
-  sample.error = scales.Error(by, dual.by_position, dual.by_velocity, dual.by_acceleration);
+  sample.error = DerivativeScales(mechanism, unit, unit, by).Error(by, dual);
   sample.limit = DualLimit(sample.control);
   return sample;
+}
+
+// What of drive forces and reactions has no derivatives, and what exerts the forces.
+void SayWhatIsLeftOut(const Mechanism& mechanism, SampledDerivatives* result) {
+  constexpr size_t kMostNamed = 8;
+  std::set<std::string> shared, none;
+  bool of_commands = false;
+  for (const SampleDerivatives& s : result->samples) {
+    if (!s.judged()) continue;
+    if (!s.no_every.empty()) {
+      none.insert(s.no_every);
+      continue;
+    }
+    of_commands = of_commands || !s.every.by.of_drives;
+    for (std::string& name : s.every.NotUnique(mechanism)) shared.insert(std::move(name));
+  }
+  for (const std::string& why : none) {
+    result->left_out.push_back("drive forces and reactions have none: " + why);
+  }
+  if (of_commands) {
+    result->left_out.emplace_back(
+        "drives are too few, or share their forces: reactions are those under forces along the "
+        "commands");
+  }
+  if (shared.empty()) return;
+  const std::vector<std::string> names(shared.begin(), shared.end());
+  result->left_out.push_back(
+      fmt::format("{} of {} components of reactions are not compared, redundant constraints share "
+                  "them: {}",
+                  names.size(), 6 * mechanism.joints.size(), Joined(names, kMostNamed)));
 }
 
 SampledDerivatives Compute(const Mechanism& mechanism, const Motion& motion, size_t count,
                            const std::function<void(double)>& progress) {
   SampledDerivatives result;
   if (motion.free()) {
-    result.why_not = "a free motion: forces are given, and motions are integrated";
+    result.why_not = "forces are given, and the motion is integrated";
     return result;
   }
   const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
@@ -100,28 +149,34 @@ SampledDerivatives Compute(const Mechanism& mechanism, const Motion& motion, siz
       progress(static_cast<double>(result.samples.size()) / static_cast<double>(chosen.size()));
     }
   }
+  SayWhatIsLeftOut(mechanism, &result);
   return result;
 }
 
 ReportSection SectionOf(const SampledDerivatives& result) {
   ReportSection section{.title = "Derivatives of forces", .link = "Derivatives"};
   section.Add(Paragraph{result.Sentence()});
-  Table table{.columns = {Digits("t, s"), Digits("error"), Digits("limit"), Text(""), Wide("")}};
+  Table table{.columns = {Digits("t, s"), Digits("along commands"), Digits("limit"),
+                          Digits("drives and reactions"), Digits("limit"), Text(""), Wide("")}};
+  const auto number = [](double x) { return std::isnan(x) ? "–" : fmt::format("{:.1e}", x); };
   for (const SampleDerivatives& s : result.samples) {
-    if (!s.why_not.empty()) {
-      table.rows.push_back(
-          {fmt::format("{:.4g}", s.time_s), "–", "–", Cell("none", Mark::kOff), s.why_not});
+    if (!s.judged()) {
+      table.rows.push_back({fmt::format("{:.4g}", s.time_s), "–", "–", "–", "–",
+                            Cell("none", Mark::kOff), s.why_not});
       continue;
     }
     table.rows.push_back(
-        {fmt::format("{:.4g}", s.time_s), fmt::format("{:.1e}", s.error),
-         fmt::format("{:.1e}", s.limit),
+        {fmt::format("{:.4g}", s.time_s), number(s.error), number(s.limit),
+         number(s.every.dual_error), number(s.every.dual_limit),
          Cell(s.agrees() ? "agrees" : "differs", s.agrees() ? Mark::kOk : Mark::kFail), ""});
   }
   section.Add(std::move(table), On::kPage);
+  for (const std::string& sentence : result.left_out) section.Note(sentence);
   section.Note(
-      "∂f/∂q, ∂f/∂v and ∂f/∂a of the forces along the commands: by implicit differentiation of the "
-      "reference, and by dual numbers through another formulation; of the largest entries.");
+      "Derivatives by positions, rates and accelerations of the commands: of the forces along "
+      "them, "
+      "and of drive forces and joint reactions; by implicit differentiation of the reference, and "
+      "by dual numbers through another formulation; of the largest entries.");
   return section;
 }
 
@@ -129,12 +184,15 @@ nlohmann::ordered_json JsonOf(const SampledDerivatives& result) {
   const auto number = [](double x) {
     return std::isfinite(x) ? nlohmann::ordered_json(x) : nlohmann::ordered_json();
   };
-  nlohmann::ordered_json json = {{"sentence", result.Sentence()}, {"why_not", result.why_not}};
+  nlohmann::ordered_json json = {
+      {"sentence", result.Sentence()}, {"why_not", result.why_not}, {"left_out", result.left_out}};
   json["samples"] = nlohmann::ordered_json::array();
   for (const SampleDerivatives& s : result.samples) {
     json["samples"].push_back({{"time_s", s.time_s},
                                {"error", number(s.error)},
                                {"limit", number(s.limit)},
+                               {"every_error", number(s.every.dual_error)},
+                               {"every_limit", number(s.every.dual_limit)},
                                {"control", number(s.control)},
                                {"why_not", s.why_not}});
   }

@@ -8,10 +8,14 @@
 namespace mbv {
 namespace {
 
+using WriteTraces = decltype(DataFormat::write);
+using WriteMatrices = std::string (*)(const std::string& path, const DataMatrices& data);
 #ifdef MBV_WITH_MAT
-constexpr auto kWriteMat = &internal::WriteMat;
+constexpr WriteTraces kWriteMat = &internal::WriteMat;
+constexpr WriteMatrices kWriteMatrices = &internal::WriteMat;
 #else
-constexpr decltype(&internal::WriteMat) kWriteMat = nullptr;
+constexpr WriteTraces kWriteMat = nullptr;
+constexpr WriteMatrices kWriteMatrices = nullptr;
 #endif
 #ifdef MBV_WITH_HDF5
 constexpr auto kWriteMat73 = &internal::WriteMat73;
@@ -38,23 +42,47 @@ const DataFormat* FindDataFormat(const std::string& word) {
   return found == formats.end() ? nullptr : &*found;
 }
 
-// The libraries write to paths only.
-std::string DataBytes(const DataFormat& format, const DataAbout& about,
-                      const std::vector<const Trace*>& traces, std::string* trouble) {
-  if (format.write == nullptr) {
-    *trouble = std::string("this mbverify writes no ") + format.file + ": it was built with " +
-               format.option + "=OFF";
-    return "";
-  }
+namespace {
+
+// The libraries write to paths only; `write` returns "" or what went wrong.
+template <typename Write>
+std::string BytesOf(const char* file, const Write& write, std::string* trouble) {
   const ScratchFolder scratch("data");
   *trouble = scratch.trouble();
   if (!trouble->empty()) return "";
-  const std::string path = (scratch.path() / format.file).string();
-  *trouble = format.write(path, about, traces);
+  const std::string path = (scratch.path() / file).string();
+  *trouble = write(path);
   if (!trouble->empty()) return "";
   const auto bytes = ReadWholeFile(path);
   if (!bytes) *trouble = "cannot read " + path;
   return bytes.value_or("");
+}
+
+std::string NotBuilt(const std::string& file, const char* option) {
+  return "this mbverify writes no " + file + ": it was built with " + option + "=OFF";
+}
+
+}  // namespace
+
+std::string DataBytes(const DataFormat& format, const DataAbout& about,
+                      const std::vector<const Trace*>& traces, std::string* trouble) {
+  if (format.write == nullptr) {
+    *trouble = NotBuilt(format.file, format.option);
+    return "";
+  }
+  return BytesOf(
+      format.file, [&](const std::string& path) { return format.write(path, about, traces); },
+      trouble);
+}
+
+std::string MatBytes(const DataMatrices& data, std::string* trouble) {
+  const DataFormat& mat = *FindDataFormat("mat");
+  if (mat.write == nullptr) {
+    *trouble = NotBuilt(".mat files", mat.option);
+    return "";
+  }
+  return BytesOf(
+      "matrices.mat", [&](const std::string& path) { return kWriteMatrices(path, data); }, trouble);
 }
 
 }  // namespace mbv

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "base/types.h"
 #include "math/trace.h"
 
 namespace mbv {
@@ -43,6 +44,15 @@ struct DataFormat {
 [[nodiscard]] std::string DataBytes(const DataFormat& format, const DataAbout& about,
                                     const std::vector<const Trace*>& traces, std::string* trouble);
 
+/// Matrices by name for `mat`: the struct `info`, a variable per matrix, and cells of texts.
+struct DataMatrices {
+  DataAbout about;
+  std::vector<std::pair<std::string, MatX>> matrices;
+  std::vector<std::pair<std::string, std::vector<std::string>>> names;
+};
+/// The bytes of the file; empty, with the reason in `trouble`, where it cannot be made.
+[[nodiscard]] std::string MatBytes(const DataMatrices& data, std::string* trouble);
+
 }  // namespace mbv
 
 // Writers of the formats of data_file.h. Internal to data/.
@@ -51,6 +61,7 @@ namespace mbv::internal {
 
 [[nodiscard]] std::string WriteMat(const std::string& path, const DataAbout& about,
                                    const std::vector<const Trace*>& traces);
+[[nodiscard]] std::string WriteMat(const std::string& path, const DataMatrices& data);
 [[nodiscard]] std::string WriteMat73(const std::string& path, const DataAbout& about,
                                      const std::vector<const Trace*>& traces);
 [[nodiscard]] std::string WriteHdf5(const std::string& path, const DataAbout& about,

@@ -44,11 +44,11 @@ Variable Text(const char* name, const std::string& text) {
 }
 
 // A column of texts.
-template <typename TextOf>
-Variable Cells(const char* name, const std::vector<Channel>& channels, const TextOf& text_of) {
-  Variable cells = Create(name, MAT_C_CELL, MAT_T_CELL, channels.size(), 1, nullptr);
-  for (size_t k = 0; cells != nullptr && k < channels.size(); ++k) {
-    Mat_VarSetCell(cells.get(), static_cast<int>(k), Text(nullptr, text_of(channels[k])).release());
+template <typename List, typename TextOf>
+Variable Cells(const char* name, const List& list, const TextOf& text_of) {
+  Variable cells = Create(name, MAT_C_CELL, MAT_T_CELL, list.size(), 1, nullptr);
+  for (size_t k = 0; cells != nullptr && k < list.size(); ++k) {
+    Mat_VarSetCell(cells.get(), static_cast<int>(k), Text(nullptr, text_of(list[k])).release());
   }
   return cells;
 }
@@ -91,16 +91,10 @@ Variable WitnessOf(const Trace& trace) {
   return Struct(trace.witness, std::move(fields));
 }
 
-}  // namespace
-
-std::string WriteMat(const std::string& path, const DataAbout& about,
-                     const std::vector<const Trace*>& traces) {
+std::string WriteAll(const std::string& path, const std::vector<Variable>& variables) {
   static_assert(!MatX::IsRowMajor, "MATLAB's matrices are stored by columns");
   const File file(Mat_CreateVer(path.c_str(), kHeader, MAT_FT_MAT5));
   if (file == nullptr) return "cannot write " + path;
-  std::vector<Variable> variables;
-  variables.push_back(InfoOf(about));
-  for (const Trace* trace : traces) variables.push_back(WitnessOf(*trace));
   for (const Variable& variable : variables) {
     if (variable == nullptr) return "cannot make the variables of " + path;
     if (Mat_VarWrite(file.get(), variable.get(), MAT_COMPRESSION_ZLIB) != 0) {
@@ -108,6 +102,29 @@ std::string WriteMat(const std::string& path, const DataAbout& about,
     }
   }
   return "";
+}
+
+}  // namespace
+
+std::string WriteMat(const std::string& path, const DataAbout& about,
+                     const std::vector<const Trace*>& traces) {
+  std::vector<Variable> variables;
+  variables.push_back(InfoOf(about));
+  for (const Trace* trace : traces) variables.push_back(WitnessOf(*trace));
+  return WriteAll(path, variables);
+}
+
+std::string WriteMat(const std::string& path, const DataMatrices& data) {
+  std::vector<Variable> variables;
+  variables.push_back(InfoOf(data.about));
+  for (const auto& [name, list] : data.names) {
+    variables.push_back(Cells(name.c_str(), list, [](const std::string& text) { return text; }));
+  }
+  for (const auto& [name, matrix] : data.matrices) {
+    variables.push_back(Number(name.c_str(), matrix.data(), static_cast<size_t>(matrix.rows()),
+                               static_cast<size_t>(matrix.cols())));
+  }
+  return WriteAll(path, variables);
 }
 
 }  // namespace mbv::internal

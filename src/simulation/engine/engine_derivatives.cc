@@ -32,7 +32,8 @@ void Differentiate(const EngineModel& engine, const std::vector<Pose>& X_WB, con
   states.Resize(X_WB.size());
   states.X_WB = X_WB;
   const Eigen::Index n = T.cols(), nv = m.nv;
-  MatX U(nv, n);
+  MatX& U = out->U;
+  U.resize(nv, n);
   for (Eigen::Index k = 0; k < n; ++k) {
     for (size_t b = 1; b < X_WB.size(); ++b) {
       states.V_WB[b] = T.block<6, 1>(6 * (static_cast<Eigen::Index>(b) - 1), k);
@@ -45,6 +46,7 @@ void Differentiate(const EngineModel& engine, const std::vector<Pose>& X_WB, con
     U.col(k) = Eigen::Map<const VecX>(data->qvel, nv);
   }
   mju_zero(data->qvel, m.nv);
+  out->qpos = Eigen::Map<const VecX>(data->qpos, m.nq);
   for (size_t d = 0; d < mechanism.drives.size(); ++d) {
     data->ctrl[simulation::IdOf(m, mjOBJ_ACTUATOR, mechanism.drives[d].name)] =
         drive_force[static_cast<Eigen::Index>(d)];
@@ -56,13 +58,16 @@ void Differentiate(const EngineModel& engine, const std::vector<Pose>& X_WB, con
   const double h = m.opt.timestep;
   const MatX by_q = A.block(nv, 0, nv, nv) / h;
   const MatX by_v = (MatX(A.block(nv, nv, nv, nv)) - MatX::Identity(nv, nv)) / h;
-  const Eigen::ColPivHouseholderQR<MatX> seen(U);
-  out->by_position = seen.solve(by_q * U);
-  out->by_velocity = seen.solve(by_v * U);
+  out->by_position = out->InCoordinates(by_q * U);
+  out->by_velocity = out->InCoordinates(by_v * U);
   out->summary = RunSummary::Done();
 }
 
 }  // namespace
+
+MatX EngineDerivatives::InCoordinates(const MatX& rates) const {
+  return U.colPivHouseholderQr().solve(rates);
+}
 
 EngineDerivatives DifferentiateEngine(const Mechanism& mechanism, const std::vector<Pose>& X_WB,
                                       const MatX& T, const VecX& drive_force,
@@ -79,7 +84,8 @@ EngineDerivatives DifferentiateEngine(const Mechanism& mechanism, const std::vec
     options.pictures = false, options.prescribed = false;
     options.default_softness = default_softness;
     EngineModel engine;
-    out.summary = MakeEngineModel(mechanism, WriteMjcf(mechanism, options), &engine);
+    out.mjcf = WriteMjcf(mechanism, options);
+    out.summary = MakeEngineModel(mechanism, out.mjcf, &engine);
     if (out.summary.ok()) Differentiate(engine, X_WB, T, drive_force, &out);
   } catch (const EngineError& error) {
     out.summary = {.stop = Stop::kEngineFailure, .message = error.what()};

@@ -2,6 +2,8 @@
 // time by differences, loops as soft as its equalities are.
 #pragma once
 
+#include <string>
+
 #include "base/run_summary.h"
 #include "base/types.h"
 #include "mechanism/mechanism.h"
@@ -12,6 +14,14 @@ namespace mbv {
 struct EngineDerivatives {
   RunSummary summary;  ///< kUnsupported where MuJoCo's model lacks a part of the mechanism
   MatX by_position, by_velocity;  ///< ∂a/∂q, ∂a/∂v of the coordinates that `T` has columns for
+  // What it was asked, for another MuJoCo: the model, its configuration, and MuJoCo's rates per
+  // unit rate of each coordinate (nv × n).
+  std::string mjcf;
+  VecX qpos;
+  MatX U;
+
+  /// Of MuJoCo's own rates, those of the coordinates by least squares (both … × n).
+  [[nodiscard]] MatX InCoordinates(const MatX& rates) const;
 };
 
 /// At poses `X_WB`, at rest, under `drive_force` on the generated MJCF, whose motors act alone.

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "features/certify/certify.h"
+#include "mechanism/reach.h"
 #include "tests/mechanisms/one_of_each.h"
 
 namespace mbv::fixtures {
@@ -80,6 +81,114 @@ TEST(ExactDerivatives, DifferWhereMassesDo) {
     EXPECT_GT(Apart(off.dual.by_position, truth.implicit.by_position, unit), 1e-11);
     EXPECT_GT(Apart(off.implicit.by_position, truth.dual.by_position, unit), 1e-11);
   }
+}
+
+// Of every force of a state both ways: the largest difference, of unique components of reactions
+// and of what acts, and the number of such components.
+struct ForcesApart {
+  double off = kNan;
+  size_t unique = 0;
+  bool of_drives = false;
+};
+ForcesApart CompareForces(const Mechanism& described, const Mechanism& known,
+                          Differentiated* subject, const std::string& refused = "") {
+  ForcesApart apart;
+  EveryForce by;
+  MatX T;
+  (void)subject->Forces(subject->q, subject->v, subject->a);
+  EXPECT_TRUE(subject->reduced->Motions(&T).ok()) << described.name;
+  const RunSummary summary = subject->reduced->AllDerivatives(T, subject->loads, &by);
+  EXPECT_EQ(summary.ok() ? "" : summary.message, refused) << described.name;
+  if (!summary.ok()) return apart;
+  Motion motion;
+  for (const Coordinate& coordinate : subject->coordinates) {
+    motion.commands.push_back({.name = "", .terms = {{coordinate, 1.0}}});
+  }
+  CommandSample command;
+  command.position = subject->q, command.velocity = subject->v;
+  command.acceleration = subject->a, command.loads = subject->loads;
+  ExactDerivatives dual;
+  dual.of_drives = by.of_drives;
+  const std::string trouble =
+      DifferentiateExactly(known, motion, subject->reduced->states(), command, &dual);
+  EXPECT_EQ(trouble, "") << described.name;
+  if (!trouble.empty()) return apart;
+  const double length = CharacteristicLength(described);
+  VecX rows(by.reactions.force.size());
+  for (Eigen::Index i = 0; i < rows.size(); ++i) {
+    rows[i] = !by.unique[static_cast<size_t>(i)] ? 0.0 : i % 6 < 3 ? length : 1.0;
+  }
+  apart.off = 0.0, apart.of_drives = by.of_drives;
+  apart.unique = static_cast<size_t>(std::ranges::count(by.unique, true));
+  const auto look = [&](const MatX& x, const MatX& y, const VecX& scale) {
+    const MatX size = scale * subject->unit.transpose();
+    const double largest = y.cwiseProduct(size).cwiseAbs().maxCoeff();
+    const double off = (x - y).cwiseProduct(size).cwiseAbs().maxCoeff();
+    if (off > 1e-12) apart.off = std::max(apart.off, off / largest);
+  };
+  for (const auto of :
+       {&ForceSlopes::by_position, &ForceSlopes::by_velocity, &ForceSlopes::by_acceleration}) {
+    if (rows.size() > 0) look(by.reactions.*of, dual.reactions.*of, rows);
+    look(by.acting.*of, dual.*of, VecX::Ones(by.acting.force.size()));
+  }
+  return apart;
+}
+
+TEST(ExactDerivatives, OfEveryForceAgreeWithThoseOfTheReference) {
+  unsigned seed = 1;
+  size_t unique = 0, of_drives = 0, all = 0;
+  for (const Mechanism& mechanism : MechanismsWithDerivatives()) {
+    Differentiated subject(mechanism);
+    if (subject.coordinates.empty()) continue;
+    Load following;
+    AddAllLoads(&subject, &following);
+    subject.Choose(seed++);
+    const ForcesApart apart = CompareForces(mechanism, mechanism, &subject);
+    EXPECT_LT(apart.off, 1e-10) << mechanism.name;
+    unique += apart.unique, of_drives += apart.of_drives ? 1U : 0U, ++all;
+  }
+  EXPECT_GT(unique, 800U);
+  EXPECT_GT(of_drives, 15U);
+  EXPECT_LT(of_drives, all);  // some under forces along the coordinates
+}
+
+TEST(ExactDerivatives, OfEveryForceDifferWhereMassesDo) {
+  for (const Mechanism& mechanism : MechanismsWithDerivatives()) {
+    if (mechanism.name != "stewart" && mechanism.name != "scara_robot") continue;
+    Differentiated subject(mechanism);
+    subject.Choose(3);
+    Mechanism off = mechanism;
+    for (Body& body : off.bodies) body.mass *= 1.0 + 1e-8;
+    EXPECT_LT(CompareForces(mechanism, mechanism, &subject).off, 1e-11);
+    EXPECT_GT(CompareForces(mechanism, off, &subject).off, 1e-10);
+  }
+}
+
+// Journals and a guide with friction by what they bear: at rest there is no derivative; in motion
+// a coefficient that is off by 1e-7 shows.
+TEST(ExactDerivatives, OfFrictionByLoad) {
+  const Mechanism mechanism = ModelAt("/models/journal_crank/model.yaml");
+  Differentiated subject(mechanism);
+  ASSERT_EQ(subject.coordinates.size(), 1U);
+  subject.Choose(5);
+  for (const double rate : {1.0, -7.0}) {
+    subject.v[0] = rate;
+    const ForcesApart apart = CompareForces(mechanism, mechanism, &subject);
+    EXPECT_LT(apart.off, 1e-11);
+    EXPECT_TRUE(apart.of_drives);
+    EXPECT_GT(apart.unique, 15U);
+    Mechanism off = mechanism;
+    for (ForceElement& element : off.elements) {
+      if (auto* friction = std::get_if<FrictionLaw>(&element.law)) {
+        friction->coefficient *= 1.0 + 1e-7;
+      }
+    }
+    EXPECT_GT(CompareForces(mechanism, off, &subject).off, 1e-10);
+  }
+  subject.v[0] = 0.0;
+  (void)CompareForces(mechanism, mechanism, &subject,
+                      "friction of joint 'A' rests with dry friction: a state alone does not "
+                      "determine accelerations");
 }
 
 }  // namespace

@@ -393,6 +393,20 @@ class Commands(unittest.TestCase):
         with self.assertRaises(mbverify.InputError):
             mbverify.linearise("stewart", at={"leg9": 1})
 
+    def test_derivatives_of_forces_have_a_row_per_channel(self):
+        result = mbverify.linearise("spr_tripod/tool_load", time=0.5, data=["mat"])
+        self.assertTrue(result.agrees)
+        self.assertTrue((result.folder / "linearise.mat").is_file())
+        channels = result.force_channels
+        drives = [f"{name}.force" for name in result.summary["drives"]]
+        self.assertEqual(channels[-len(drives) :], drives)
+        self.assertIn(".reaction.", channels[0])
+        forces = result.matrix("force_q")
+        self.assertEqual(forces.shape, (len(channels), len(result.coordinates)))
+        # Drives are the coordinates: their forces' derivatives are those of f.
+        f_q = result.matrix("f_q")
+        self.assertLess(np.abs(forces[-len(drives) :] - f_q).max(), 1e-9 * np.abs(f_q).max())
+
     def test_a_wrong_number_is_a_verdict(self):
         result = mbverify.run("four_bar/static", set={"simulation.parameters": "{rho: 2.1}"})
         self.assertEqual(result.verdict, "disagree")

@@ -408,8 +408,19 @@ class Linearisation(_Result):
         return self.summary["coordinates"]
 
     def matrix(self, name):
-        """`A`, `B`, `M`, `K`, `D`, `J_d`, `f_q`, `f_v` or `f_a` as an array."""
+        """`A`, `B`, `M`, `K`, `D`, `J_d`, `f_q`, `f_v` or `f_a` as an array; `force_q`, `force_v`
+        or `force_a`: derivatives of drive forces and reactions, a row per force_channels."""
+        if name in self._OF_FORCES:
+            rows = self.summary["forces"][self._OF_FORCES[name]]
+            return numpy.array(rows, dtype=float).reshape(len(rows), len(self.coordinates))
         return numpy.array(self.summary[name], dtype=float)
+
+    _OF_FORCES = {"force_q": "by_position", "force_v": "by_velocity", "force_a": "by_acceleration"}
+
+    @property
+    def force_channels(self):
+        """Drive forces and those reactions that are unique, named as in traces."""
+        return self.summary["forces"]["channels"]
 
     @property
     def eigenvalues(self):
@@ -446,13 +457,16 @@ def linearise(
     no_forces=False,
     equilibrium=False,
     servos=False,
+    time=None,
+    data=(),
     set=None,
     out=None,
 ):
     """A mechanism about a state; its Linearisation.
 
     `at`, `rates` and `forces` (of drives): {name: value}; names of `at` and `rates` may end in _mm
-    or _deg. Raises InputError for bad input.
+    or _deg. With `time` [s] `model` is a scenario, whose motion and loads at this instant are the
+    state. `data=["mat"]` also writes linearise.mat. Raises InputError for bad input.
     """
     folder = _Folder(out)
     options = []
@@ -468,6 +482,10 @@ def linearise(
     ):
         if wanted:
             options.append(option)
+    if time is not None:
+        options += ["--time", repr(float(time))]
+    for word in data:
+        options += ["--data", word]
     document, _, text = _call(
         "linearise", model, *options, *_set(set), "--out", folder.path, allowed=(0, 1)
     )
