@@ -24,6 +24,7 @@ import {pathToFileURL} from 'node:url';
 
 import {leastSolution} from '../examples/witness/mujoco/algebra.mjs';
 import {load, messageOf, Refused} from '../examples/witness/mujoco/engine.mjs';
+import {equalityBias} from '../examples/witness/mujoco/inverse.mjs';
 
 export const COMPILED = 1e-9, MOVING = 1e-6;  // limits, relative
 const STATES = 12;                            // samples of a motion
@@ -243,8 +244,7 @@ export class Robot {
     const gap = this.close(x), {J} = this.rows(), ne = data.ne;
     data.qvel.set(leastSolution(J, [...Array(ne).fill(0), ...none, ...rate]));
     mj.mj_forward(model, data);
-    const bias = Array.from({length: ne}, (_, r) => -data.efc_aref[r] - data.efc_KBIP[4 * r + 1] * data.efc_vel[r] -
-        data.efc_KBIP[4 * r] * data.efc_KBIP[4 * r + 2] * data.efc_pos[r]);
+    const bias = equalityBias(data);
     const qacc = leastSolution(J, [...bias.map((value) => -value), ...none, ...acceleration]);
     model.opt.disableflags = this.flags | this.unconstrained;
     data.qacc.set(qacc);

@@ -167,7 +167,9 @@ void AddPackages(CLI::App* command) {
             }
             UseMeshPackages(std::move(packages));
           },
-          "NAME=DIR: meshes package://NAME/… lie in DIR (repeatable)")
+          "NAME=DIR: package://NAME/… and model://NAME/… lie in DIR, whose files a robot's file "
+          "may "
+          "name (repeatable)")
       ->allow_extra_args(false);
 }
 

@@ -88,6 +88,7 @@ bool CheckTree(const ClosureHints& hints, Mechanism* mechanism, ModelReport* rep
 /// How loops may be closed that their data leave open.
 struct ClosureRules {
   double tolerance_m = 0.0;      ///< up to which rounded data are projected, or …
+  double farthest_m = 0.0;       ///< joint frames are moved no farther; CloseLoops() sets it
   PrintedRounding printed = {};  ///< … as far as the digits of a robot's file explain
   bool bare_urdf = false;        ///< no model file: joints named as balls are taken for such
   bool is_robot = false;         ///< of a foreign format: options say what a model file would

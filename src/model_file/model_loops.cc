@@ -398,7 +398,8 @@ DataProjection ProjectData(Mechanism* mechanism, double gap, const Way& way) {
 namespace mbv::internal {
 namespace {
 
-// Joint frames may have to move farther than the gap that they leave at home is wide.
+// Joint frames may have to move farther than the gap that they leave at home is wide, but not
+// farther than digits explain.
 constexpr double kProjectionReach = 10.0;
 // Guesses are given to some digits; a driven joint that home moves farther is reported [rad,
 // characteristic lengths].
@@ -412,7 +413,7 @@ bool Project(const ClosureRules& rules, double gap, const std::string& why, Mech
     Mechanism projected = *mechanism;
     const DataProjection projection = ProjectData(&projected, gap, way);
     const double moved_m = std::max(projection.moved_m, projection.turned_rad * length_m);
-    if (!projection.closed || moved_m > kProjectionReach * rules.tolerance_m) continue;
+    if (!projection.closed || moved_m > rules.farthest_m) continue;
     *mechanism = std::move(projected);
     const std::string text = fmt::format(
         "joint frames moved by up to {:.2g} m and {:.2g} rad, because the loops are "
@@ -460,6 +461,7 @@ void FreeStuckDrives(const ClosureRules& given, Mechanism* mechanism, ModelRepor
   if (names.empty()) return;
   ClosureRules rules = given;
   rules.tolerance_m = kDrawn * CharacteristicLength(*mechanism);
+  rules.farthest_m = kProjectionReach * rules.tolerance_m;
   (void)ProjectLoopsThatCannotMove(
       rules, fmt::format("{} could not move otherwise", Joined(names, 4)), mechanism, report);
 }
@@ -785,6 +787,49 @@ class SingularHome {
   const int dofs_;
 };
 
+// The joints in which a group of loops would move most if constraints up to `gap` did not hold it.
+std::vector<std::string> SoftJoints(const Mechanism& part, double gap) {
+  constexpr size_t kMost = 4;
+  constexpr double kLeast = 0.1;  // of the largest
+  const internal::SparseRows J = ScaledRows(part);
+  const MatX free = internal::FindRank(J, internal::NullSpaces::kMotion).motion;
+  MatX soft = internal::FindRank(J, internal::NullSpaces::kMotion, RankTolerance(gap)).motion;
+  if (free.cols() > 0) soft -= free * free.completeOrthogonalDecomposition().solve(soft);
+  Eigen::Index largest = 0;
+  soft.colwise().norm().maxCoeff(&largest);
+  const auto turning = [&](int body) -> Vec3 {
+    return body == 0 ? Vec3(Vec3::Zero()) : Vec3(soft.col(largest).segment<3>(6 * (body - 1)));
+  };
+  std::vector<std::pair<double, std::string>> moves;
+  for (const Joint& joint : part.joints) {
+    moves.emplace_back(-(turning(joint.child) - turning(joint.parent)).norm(), joint.name);
+  }
+  std::sort(moves.begin(), moves.end());
+  std::vector<std::string> names;
+  for (size_t i = 0; i < std::min(moves.size(), kMost); ++i) {
+    if (moves[i].first <= kLeast * moves[0].first) names.push_back(moves[i].second);
+  }
+  return names;
+}
+
+// Loops that rounding alone holds, as it does two cranks in one line: what they bear is noise.
+void ReportDeadPoints(const Mechanism& mechanism, ModelReport* report) {
+  constexpr double kGap = 4e-7;  // singular values below 1.2e-5 hold nothing to nine digits
+  for (const LoopGroup& group : LoopGroups(mechanism)) {
+    const Mechanism part = GroupAlone(mechanism, group);
+    if (CountNearlyRedundant(part, kGap) == CountNearlyRedundant(part, 0.0)) continue;
+    report->AtJoint(
+        static_cast<size_t>(group.closures.front()),
+        {.message = fmt::format("the loops at '{}' stand at a dead point at home: nothing but "
+                                "rounded numbers keeps {} from turning, so that neither how they "
+                                "go on nor what they bear is known",
+                                mechanism.joints[group.closures.front()].name,
+                                Joined(SoftJoints(part, kGap))),
+         .hint = "a spring leaf is a joint with a spring; a keyframe, "
+                 "or guesses in a model file, state another pose"});
+  }
+}
+
 // Home is moved by a step in which the first motion goes on.
 void LeaveSingularHome(Mechanism* mechanism, ModelReport* report) {
   for (const LoopGroup& group : LoopGroups(*mechanism)) {
@@ -813,7 +858,9 @@ void LeaveSingularHome(Mechanism* mechanism, ModelReport* report) {
 
 void CloseLoops(const ClosureRules& given, Mechanism* mechanism, ModelReport* report) {
   ClosureRules rules = given;
-  rules.tolerance_m = std::max(rules.tolerance_m, ExplainedGap(rules.printed, *mechanism));
+  const double explained_m = ExplainedGap(rules.printed, *mechanism);
+  rules.tolerance_m = std::max(given.tolerance_m, explained_m);
+  rules.farthest_m = std::max(kProjectionReach * given.tolerance_m, explained_m);
   GuessFollowers(rules.guessed, mechanism);
   const HomeResult home = SolveHome(mechanism, rules.assembly);
   if (!home.unmet.empty()) return ReportUnmet(*mechanism, home, report);
@@ -828,7 +875,10 @@ void CloseLoops(const ClosureRules& given, Mechanism* mechanism, ModelReport* re
     } else if (home.drives_moved) {
       WarnAboutMovedDrives(*mechanism, report);
     }
-    if (rules.is_robot) LeaveSingularHome(mechanism, report);
+    if (rules.is_robot) {
+      LeaveSingularHome(mechanism, report);
+      ReportDeadPoints(*mechanism, report);
+    }
     return;
   }
   const double gap_m = home.gap * CharacteristicLength(*mechanism);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -14,7 +15,9 @@
 #include "base/text.h"
 #include "kinematics/mobility.h"
 #include "math/bytes.h"
+#include "mechanism/joint_pose.h"
 #include "model_file/load_model.h"
+#include "model_file/mesh/read_mesh.h"
 #include "model_file/sdf/read_sdf.h"
 #include "model_file/write_model.h"
 #include "tests/support/test_folder.h"
@@ -804,6 +807,85 @@ TEST(SdfImport, TheSourceGoesToTheReaderAsItIs) {
   EXPECT_EQ(ToBytes(*back), ToBytes(*source));
   EXPECT_EQ(back->left_out.size(), 1u);
   EXPECT_FALSE(FromBytes<SdfSource>(ToBytes(*source).substr(1)));
+}
+
+// libsdformat 12 refuses a file for any of these.
+TEST(SdfImport, WhatNoForceNeedsMayBeFaulty) {
+  const Read plain = ReadText(ArmText());
+  ASSERT_TRUE(plain.mechanism) << plain.text;
+  const std::string faulty[] = {
+      "<sensor name='s' type='air_speed_of_tomorrow'/>",
+      "<visual name='v'><geometry><box><size>1 1 1</size></box></geometry><material><script>"
+      "<name>Grey</name></script></material></visual>",
+      "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry><surface><friction>"
+      "<ode><mu>much</mu></ode></friction></surface></collision>",
+      "<!-- <sensor> --><sensor name='s' type='none' note='a > b'><sensor/></sensor>"};
+  for (const std::string& arm : faulty) {
+    const Read read = ReadText(ArmText({.arm = arm}));
+    ASSERT_TRUE(read.mechanism) << arm << "\n" << read.text;
+    EXPECT_EQ(read.mechanism->bodies.size(), plain.mechanism->bodies.size()) << arm;
+  }
+  // Lines stay as they are.
+  const Read wrong =
+      ReadText(ArmText({.arm = "<sensor name='s'>\n\n</sensor>", .more = "\n<link/>"}));
+  EXPECT_THAT(wrong.text, HasSubstr("robot.sdf:4:")) << wrong.text;
+}
+
+TEST(SdfImport, WhatIsMergedMayMergeOthers) {
+  const test::TestFolder folder("sdf_merge");
+  const auto merging = [](const std::string& name, const std::string& of) {
+    return fmt::format(
+        "<sdf version='1.9'><model name='{}'><include merge='true'><uri>{}</uri></include></model>"
+        "</sdf>",
+        name, of);
+  };
+  folder.Write("inner.sdf", ArmText({.pose = "0.123456789012345 0.2 0.3 0.3 -0.2 0.5"}));
+  folder.Write("middle.sdf", merging("middle", "inner.sdf"));
+  const std::string text = merging("outer", "middle.sdf");
+  const Read read = ReadFile(folder.Write("outer.sdf", text), text);
+  ASSERT_TRUE(read.mechanism) << read.text;
+  const Joint& j = read.mechanism->joints[read.mechanism->FindJoint("j")];
+  EXPECT_NEAR(j.X_PF.translation().x(), 0.123456789012345, 1e-15);
+  // Gazebo's models by their names, beside the file's folder.
+  folder.Write("models/part/model.config", "<model><sdf version='1.9'>part.sdf</sdf></model>");
+  folder.Write("models/part/part.sdf", ArmText());
+  for (const char* uri : {"model://part", "part"}) {
+    const std::string whole = merging("whole", uri);
+    const std::string file = folder.Write("models/whole/whole.sdf", whole);
+    EXPECT_FALSE(ReadFile(file, whole).mechanism) << uri;
+    UseMeshPackages({{"", folder.PathOf("models")}});
+    const Read opened = ReadFile(file, whole);
+    UseMeshPackages({});
+    EXPECT_TRUE(opened.mechanism) << uri << opened.text;
+  }
+}
+
+TEST(SdfImport, AnAxisOfTwoWhoseLimitsAreEqualIsHeld) {
+  const auto joint = [](const std::string& first, const std::string& second) {
+    return "<axis><xyz>0 0 1</xyz>" + first + "</axis><axis2><xyz>0 1 0</xyz>" + second +
+           "</axis2>";
+  };
+  const std::string held = "<limit><lower>0.3</lower><upper>0.3</upper></limit>",
+                    damped = "<dynamics><damping>0.7</damping></dynamics>";
+  const Read both = ReadText(ArmText({.type = "universal", .joint = joint("", damped)}));
+  ASSERT_TRUE(both.mechanism) << both.text;
+  const Joint& universal = both.mechanism->joints[both.mechanism->FindJoint("j")];
+  for (const int k : {0, 1}) {
+    const std::string axes = k == 0 ? joint(held, damped) : joint(damped, held);
+    const Read read = ReadText(ArmText({.type = "universal", .joint = axes}));
+    ASSERT_TRUE(read.mechanism) << read.text;
+    EXPECT_THAT(read.text, HasSubstr(fmt::format("axis {} of joint 'j' is held at 0.3", k + 1)));
+    const Joint& hinge = read.mechanism->joints[read.mechanism->FindJoint("j")];
+    ASSERT_EQ(hinge.kind, JointKind::kRevolute);
+    const auto pose = [](const Joint& one, const std::array<double, 6>& q) {
+      return (one.X_PF * JointPose(one, q) * one.X_CM.inverse()).matrix();
+    };
+    const std::array<double, 6> two =
+        k == 0 ? std::array<double, 6>{0.3, 0.4} : std::array<double, 6>{0.4, 0.3};
+    EXPECT_TRUE(pose(hinge, {0.4}).isApprox(pose(universal, two), kSame)) << k;
+    ASSERT_EQ(read.mechanism->elements.size(), 1u);
+    EXPECT_EQ(read.mechanism->elements[0].coordinate, 0);
+  }
 }
 
 }  // namespace

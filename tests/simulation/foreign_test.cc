@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "model_file/load_model.h"
+#include "model_file/mesh/read_mesh.h"
 #include "model_file/write_model.h"
 #include "simulation/engine/engine_model.h"
 #include "simulation/import/read_mjcf.h"
@@ -804,6 +805,58 @@ TEST(ForeignMjcf, AttachedModelsKeepTheirClassesUnitsAndKeyframes) {
 }
 
 // Options of the whole hold; where they are merged, what only the attached model states is taken.
+// MuJoCo 2.2's own principal axes are right to six digits.
+TEST(ForeignMjcf, AFullTensorIsTakenAsItStands) {
+  const Read read = ReadText(
+      "<mujoco><worldbody><body name='rod'><joint/><inertial pos='0.1 0 0' mass='1.3' fullinertia="
+      "'0.000932 0.016409 0.016501 0.00061 0.000102 9e-06'/></body></worldbody></mujoco>");
+  ASSERT_TRUE(read.model) << read.diagnostics.Text();
+  const Mechanism& m = read.model->mechanism;
+  Mat3 expected;
+  expected << 0.000932, 0.00061, 0.000102, 0.00061, 0.016409, 9e-06, 0.000102, 9e-06, 0.016501;
+  const Mat3 off = m.bodies[m.FindBody("rod")].I_Bcm_B - expected;
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-16);
+}
+
+// As MuJoCo 3 has it: each model keeps its own class of a name.
+TEST(ForeignMjcf, AttachedModelsMayHaveClassesOfTheSameNameAndLieInOpenFolders) {
+  const auto arm = [](double damping, const std::string& inside) {
+    return fmt::format(
+        "<mujoco model='m{0}'><default><default class='link'><joint damping='{0}'/></default>"
+        "</default>{1}<worldbody><body name='b{0}'><joint name='j{0}' class='link' axis='0 1 0'/>"
+        "<geom size='0.1'/>{2}</body></worldbody></mujoco>",
+        damping,
+        inside.empty() ? "" : "<asset><model name='part' file='../parts/part.xml'/></asset>",
+        inside);
+  };
+  const test::TestFolder folder("attach_open");
+  folder.Write("parts/part.xml", arm(0.25, ""));
+  const std::string text =
+      arm(0.5,
+          "<attach model='part' prefix=''/><frame pos='1 0 0'><attach model='part' body='b0.25' "
+          "prefix='again_'/></frame>");
+  const std::string file = folder.Write("whole/whole.xml", text);
+  const auto read_it = [&] {
+    Read read;
+    read.model = ReadMjcf(text, file, {}, &read.diagnostics);
+    return read;
+  };
+  const Read closed = read_it();
+  EXPECT_FALSE(closed.model);
+  EXPECT_NE(closed.diagnostics.Text().find("--package NAME=DIR"), std::string::npos);
+  UseMeshPackages({{"parts", folder.PathOf("parts")}});
+  const Read open = read_it();
+  UseMeshPackages({});
+  ASSERT_TRUE(open.model) << open.diagnostics.Text();
+  std::map<std::string, double> dampings;
+  for (const auto& element : open.model->mechanism.elements) {
+    dampings[element.name] = std::get<DampingLaw>(element.law).damping;
+  }
+  const std::map<std::string, double> expected = {
+      {"j0.5_damping", 0.5}, {"j0.25_damping", 0.25}, {"again_j0.25_damping", 0.25}};
+  EXPECT_EQ(dampings, expected);
+}
+
 TEST(ForeignMjcf, OptionsOfAttachedModelsAreMergedWhereTheModelSaysSo) {
   const test::TestFolder folder("merge");
   folder.Write("hand.xml",

@@ -8,6 +8,8 @@ import {fileURLToPath} from 'node:url';
 import {CASES, radialAcceleration} from '../../examples/upstream/velocity_term.mjs';
 import {leastSolution} from '../../examples/witness/mujoco/algebra.mjs';
 import {compile, load, messageOf} from '../../examples/witness/mujoco/engine.mjs';
+import {inverse} from '../../examples/witness/mujoco/inverse.mjs';
+import {Simulation} from '../../examples/witness/mujoco/simulation.mjs';
 
 const models = fileURLToPath(new URL('../../models', import.meta.url));
 const engine = await load(fileURLToPath(import.meta.url));
@@ -53,4 +55,29 @@ test('Least solutions: of full rank, of dependent rows, of too few rows', () => 
   near(leastSolution([[1, 1], [2, 2]], [1, 2]), [0.5, 0.5]);
   near(leastSolution([[3, 4]], [5]), [0.6, 0.8]);
   near(leastSolution([[0, 0], [1, 0]], [0, 7]), [7, 0]);
+});
+
+// A bar on a hinge whose end is held on the bar's own circle, driven by one or two drives.
+const bar = (drives) => new Simulation(engine, `<mujoco><compiler angle="radian"/><worldbody>
+  <body><joint name="A" axis="0 1 0"/><inertial pos="0.5 0 0" mass="2" diaginertia="0.1 0.1 0.1"/>
+    <site name="end" pos="1 0 0"/></body></worldbody><tendon/>
+  <equality>${drives.map((name) => `<joint name="drive:${name}" joint1="A"/>`).join('')}</equality></mujoco>`, drives);
+
+test('Inverse dynamics: forces as by hand, of redundant drives the least, rows of round-off left out', () => {
+  const q = 0.3, v = 0.8, a = -1.7, torque = (0.1 + 2 * 0.25) * a - 2 * 9.81 * 0.5 * Math.cos(q);
+  for (const names of [['one'], ['one', 'two']]) {
+    const simulation = bar(names), motion = names.map(() => [q, v, a]);
+    simulation.start(motion);
+    const driven = inverse(simulation, motion);
+    for (const one of driven) {
+      assert.ok(Math.abs(one.force - torque / names.length) < 1e-10, `${one.force} is not ${torque / names.length}`);
+      assert.ok(Math.abs(one.acceleration - a) < 1e-12);
+    }
+  }
+});
+
+test('Inverse dynamics refuses rows whose velocity term MuJoCo leaves out', () => {
+  const simulation = bar(['one']);
+  simulation.model.eq_data[2] = 0.5;  // of a quadratic polynomial
+  assert.throws(() => inverse(simulation, [[0, 0, 0]]), /velocity term/);
 });

@@ -6,14 +6,21 @@ const dot = (a, b) => {
   return sum;
 };
 
-// A row is dependent where this share of it, or less, stands out of the rows before it.
+/** A row is dependent where this share of it, or less, stands out of the rows before it. A row that is
+ * this share of the largest, or less, is round-off of zero. */
 const DEPENDENT = 1e-9;
+
+/** {row, size, b}: the rows that are not zero, with their right-hand sides. */
+export function rowsToUse(J, b = []) {
+  const rows = J.map((row, i) => ({row: Float64Array.from(row), b: b[i], size: Math.sqrt(dot(row, row))}));
+  const largest = Math.max(0, ...rows.map((entry) => entry.size));
+  return rows.filter((entry) => entry.size > DEPENDENT * largest);
+}
 
 /** The x of least norm with J x = b in the rows that are independent: modified Gram-Schmidt on the
  * rows, the one that stands out most first. J: rows of equal length; b: their right-hand sides. */
 export function leastSolution(J, b) {
-  const rows = J.map((row, i) => ({row: Float64Array.from(row), b: b[i], size: Math.sqrt(dot(row, row))}))
-                   .filter((entry) => entry.size > 0);
+  const rows = rowsToUse(J, b);
   const x = new Float64Array(J.length > 0 ? J[0].length : 0);
   while (rows.length > 0) {
     let best = 0, share = 0;

@@ -2,7 +2,7 @@
 import {compile, indicesOf, Refused} from './engine.mjs';
 import {leastSolution} from './algebra.mjs';
 
-const EQUALITY_DATA = 11;  // numbers of eq_data for each equality
+export const EQUALITY_DATA = 11;  // numbers of eq_data for each equality
 const CLOSED = 1e-13;      // to which loops are closed at the start, of the largest coordinate
 const STEEPEST = 0.9999;   // the stiffest impedance that MuJoCo takes
 const WALK = 40;           // steps from home to the first sample
@@ -12,6 +12,7 @@ export class Simulation {
   constructor(engine, xml, names) {
     const {mj} = engine;
     const {model, messages} = compile(engine, xml);
+    model.opt.jacobian = mj.mjtJacobian.mjJAC_DENSE.value;  // rows are read
     Object.assign(this, {engine, mj, model, messages, data: new mj.MjData(model)});
     this.equalities = indicesOf(engine, model, mj.mjtObj.mjOBJ_EQUALITY, model.neq);
     this.prescribed = names.map((name) => this.equalityOf(name));

@@ -3,10 +3,12 @@ import fs from 'node:fs';
 
 import {Refused} from './engine.mjs';
 import {readLoads, readMotion} from './handed.mjs';
+import {inverse} from './inverse.mjs';
 import {Simulation} from './simulation.mjs';
 
 const METHODS = {
   stiff: 'mj_step; equalities as stiff as MuJoCo takes them, rates in the drives\' targets',
+  inverse: 'mj_inverse; loops closed by MuJoCo\'s Jacobians, nothing is soft',
   defaults: 'mj_step; equalities of MuJoCo\'s default softness, positions as the drives\' targets',
 };
 const DECLINED = [{what: 'joint reactions', why: 'only drives, outputs and loops are read out'}];
@@ -47,14 +49,30 @@ function outputPoses(simulation, mechanism) {
 }
 
 // One sample: forces at the time itself, before the step that leads on.
-function record(simulation, outputs, time) {
-  const {mj, model, data} = simulation;
-  mj.mj_forward(model, data);
-  const cells = simulation.driven().flatMap(
+function record(driven, simulation, outputs, time) {
+  const cells = driven.flatMap(
       (one) => one.prescribed ? [one.force] : [one.position, one.velocity, one.acceleration, one.force]);
   const row = [time, ...cells, ...outputs.flatMap((output) => output.read()), simulation.gap()];
   if (!row.every(Number.isFinite)) throw new Refused(`the simulation diverges at t = ${time} s`);
   return row.join(',');
+}
+
+// Puts MuJoCo's bodies where loads need them, and applies these.
+function load(simulation, loads, i, s) {
+  if (loads.bodies.length === 0) return;
+  const {mj, model, data} = simulation;
+  mj.mj_kinematics(model, data);
+  mj.mj_comPos(model, data);
+  simulation.applyLoads(loads.at(i, s));
+}
+
+function runInverse(simulation, outputs, motion, loads) {
+  simulation.start(motion.at(0, 0));
+  return motion.times.map((time, i) => {
+    simulation.close(motion.at(i, 0).map(([position]) => position));
+    load(simulation, loads, i, 0);
+    return record(inverse(simulation, motion.at(i, 0)), simulation, outputs, time);
+  });
 }
 
 function run(simulation, outputs, motion, loads, stiff) {
@@ -69,21 +87,20 @@ function run(simulation, outputs, motion, loads, stiff) {
     for (let n = 0; n < (i + 1 < motion.times.length ? steps : 1); n++) {
       const at = motion.at(i, n / steps);
       simulation.setTargets(stiff ? simulation.targetsWithRates(at) : at.map(([position]) => position));
-      if (loads.bodies.length > 0) {
-        mj.mj_kinematics(model, data);
-        mj.mj_comPos(model, data);
-        simulation.applyLoads(loads.at(i, n / steps));
+      load(simulation, loads, i, n / steps);
+      if (n === 0) {
+        mj.mj_forward(model, data);
+        lines.push(record(simulation.driven(), simulation, outputs, time));
       }
-      if (n === 0) lines.push(record(simulation, outputs, time));
       mj.mj_step(model, data);
     }
   });
   return lines;
 }
 
-/** Computes in the present folder; throws Refused for what it cannot. Returns what stands in
- * witness.json in addition to the program's name. */
-export function witness(engine, stiff) {
+/** Computes in the present folder, by one of METHODS; throws Refused for what it cannot. Returns what
+ * stands in witness.json in addition to the program's name. */
+export function witness(engine, method) {
   if (fs.existsSync('start.csv')) throw new Refused('free motions are not stepped here');
   const mechanism = JSON.parse(fs.readFileSync('mechanism.json', 'utf8'));
   const motion = readMotion(), loads = readLoads(motion.times.length);
@@ -91,7 +108,8 @@ export function witness(engine, stiff) {
   refuse(mechanism, loads, simulation);
   const outputs = outputPoses(simulation, mechanism);
   const begun = process.cpuUsage();
-  const lines = run(simulation, outputs, motion, loads, stiff);
+  const lines = method === 'inverse' ? runInverse(simulation, outputs, motion, loads) :
+                                       run(simulation, outputs, motion, loads, method === 'stiff');
   const used = process.cpuUsage(begun), compute_s = (used.user + used.system) / 1e6;
   const named = (names, words) => names.flatMap((name) => words.map((word) => `${name}.${word}`));
   const columns = [
@@ -100,5 +118,5 @@ export function witness(engine, stiff) {
     ...named(outputs.map((output) => output.name), ['x', 'y', 'z', 'roll', 'pitch', 'yaw']),
   ];
   fs.writeFileSync('traces.csv', [['time_s', ...columns, 'closure.position'].join(','), ...lines, ''].join('\n'));
-  return {method: METHODS[stiff ? 'stiff' : 'defaults'], compute_s, declined: DECLINED};
+  return {method: METHODS[method], compute_s, declined: DECLINED};
 }

@@ -23,6 +23,7 @@
 #include "kinematics/mobility.h"
 #include "math/bytes.h"
 #include "mechanism/joint_pose.h"
+#include "model_file/mesh/read_mesh.h"
 #include "report/page.h"
 #include "verify/model_text.h"
 
@@ -354,6 +355,10 @@ int Survey(const SurveyArguments& arguments) {
     }
   }
   for (const std::string& line : unread) Say(stderr, "{}\n", line);
+  // Robots of one folder share parts.
+  std::vector<MeshPackage> open = MeshPackages();
+  open.push_back({"", arguments.folder});
+  UseMeshPackages(std::move(open));
   if (files.empty()) {
     Say(stderr, "{}: error: no *.urdf, *.sdf and no MJCF file in this folder\n", arguments.folder);
     return 2;

@@ -14,6 +14,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <initializer_list>
+#include <iterator>
 #include <map>
 #include <new>
 #include <optional>
@@ -55,10 +56,19 @@ std::vector<fs::path> AmentShares() {
 
 bool LiesBelow(const fs::path& folder, const fs::path& file) {
   std::error_code error;
-  const fs::path base = fs::weakly_canonical(folder.empty() ? "." : folder, error);
+  const fs::path base = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder), error);
   if (error) return false;
-  const fs::path inside = fs::weakly_canonical(file, error).lexically_relative(base);
+  const fs::path inside = fs::weakly_canonical(fs::absolute(file), error).lexically_relative(base);
   return !error && !inside.empty() && *inside.begin() != ".." && inside != ".";
+}
+
+// Where ROS and Gazebo look for packages and models, as their users set it.
+std::vector<fs::path> ListedFolders() {
+  std::vector<fs::path> folders;
+  for (const char* variable : {"ROS_PACKAGE_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH"}) {
+    std::ranges::copy(Listed(variable), std::back_inserter(folders));
+  }
+  return folders;
 }
 
 // Where PACKAGE/REST may be.
@@ -69,12 +79,18 @@ std::vector<fs::path> InPackage(const std::string& package, const fs::path& rest
   for (const MeshPackage& given : Packages()) {
     if (given.name == package) paths.push_back(given.folder / rest);
   }
-  for (const fs::path& listed : Listed("ROS_PACKAGE_PATH")) {
+  for (const fs::path& listed : ListedFolders()) {
     if (listed.filename() == package) paths.push_back(listed / rest);
     paths.push_back(listed / package / rest);
   }
   for (const fs::path& share : AmentShares()) paths.push_back(share / package / rest);
   paths.push_back(folder / package / rest);
+  std::error_code error;
+  for (fs::path above = fs::weakly_canonical(fs::absolute(folder.empty() ? "." : folder), error);
+       above.has_relative_path(); above = above.parent_path()) {
+    if (!MayBeNamed(above, folder)) break;
+    paths.push_back(above.parent_path() / package / rest);
+  }
   return paths;
 }
 
@@ -98,18 +114,20 @@ void UseMeshPackages(std::vector<MeshPackage> packages) { Packages() = std::move
 
 const std::vector<MeshPackage>& MeshPackages() { return Packages(); }
 
-FoundMesh FindMesh(const std::string& name, const fs::path& folder) {
+bool MayBeNamed(const fs::path& file, const fs::path& folder) {
   std::vector<fs::path> open = {folder};
   for (const MeshPackage& package : Packages()) open.push_back(package.folder);
-  for (const fs::path& listed : Listed("ROS_PACKAGE_PATH")) open.push_back(listed);
-  for (const fs::path& share : AmentShares()) open.push_back(share);
+  std::ranges::move(ListedFolders(), std::back_inserter(open));
+  std::ranges::move(AmentShares(), std::back_inserter(open));
+  return std::ranges::any_of(open, [&](const fs::path& f) { return LiesBelow(f, file); });
+}
+
+FoundMesh FindMesh(const std::string& name, const fs::path& folder) {
   bool outside = false;
   for (const fs::path& path : Candidates(name, folder)) {
     std::error_code error;
     if (!fs::is_regular_file(path, error)) continue;
-    for (const fs::path& allowed : open) {
-      if (LiesBelow(allowed, path)) return {path.lexically_normal(), "", false};
-    }
+    if (MayBeNamed(path, folder)) return {path.lexically_normal(), "", false};
     outside = true;
   }
   return {{}, outside ? "lies outside the folder of the file" : "is not there", outside};

@@ -21,6 +21,11 @@ struct MeshPackage {
 void UseMeshPackages(std::vector<MeshPackage> packages);
 [[nodiscard]] const std::vector<MeshPackage>& MeshPackages();
 
+/// True if a robot's file in `folder` may name `file`: it lies below `folder`, one of
+/// MeshPackages(), or a folder that one of the variables of FindMesh() lists. Links are followed.
+[[nodiscard]] bool MayBeNamed(const std::filesystem::path& file,
+                              const std::filesystem::path& folder);
+
 /// A mesh file, or why there is none.
 struct FoundMesh {
   std::filesystem::path path;  ///< empty: `trouble`
@@ -29,9 +34,10 @@ struct FoundMesh {
 };
 /// Finds what a robot's file in `folder` calls `name`: a path relative to the folder, an absolute
 /// one, file://…, package://NAME/… or model://NAME/…. Packages are those of UseMeshPackages(), then
-/// folders NAME of ROS_PACKAGE_PATH (or entries of that name), share/NAME of AMENT_PREFIX_PATH, and
-/// NAME below `folder`; without a name (package:///…), `folder` itself. Nothing outside of `folder`
-/// and these is found.
+/// folders NAME of ROS_PACKAGE_PATH, GZ_SIM_RESOURCE_PATH and GAZEBO_MODEL_PATH (or entries of that
+/// name), share/NAME of AMENT_PREFIX_PATH, NAME below `folder`, and NAME beside `folder` and the
+/// folders above it, as far as these may be named; without a name (package:///…), `folder` itself.
+/// Nothing is found that MayBeNamed() forbids.
 [[nodiscard]] FoundMesh FindMesh(const std::string& name, const std::filesystem::path& folder);
 
 /// `file` relative to `folder` if it lies below it, else absolute.

@@ -48,8 +48,8 @@ fs::path FindSdfReader() {
 // What the reader may know: where libraries and meshes are.
 std::vector<std::string> EnvironmentOfReader() {
   std::vector<std::string> variables;
-  for (const char* name :
-       {"LD_LIBRARY_PATH", "ASAN_OPTIONS", "TMPDIR", "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"}) {
+  for (const char* name : {"LD_LIBRARY_PATH", "ASAN_OPTIONS", "TMPDIR", "ROS_PACKAGE_PATH",
+                           "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "AMENT_PREFIX_PATH"}) {
     if (const char* value = std::getenv(name)) {
       variables.push_back(fmt::format("{}={}", name, value));
     }

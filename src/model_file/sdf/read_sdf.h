@@ -58,8 +58,10 @@ struct SdfSource {
   };
   struct Include {
     std::string uri, file;  ///< as written; absolute
+    std::string text;       ///< as SdfSource::text
   };
-  std::string text, file;
+  std::string text;  ///< without what is of no use, such as sensors, which libsdformat may refuse
+  std::string file;
   std::string folder;  ///< of the file, absolute
   FloatingBase base;   ///< by option
   std::vector<Include> includes;
@@ -74,7 +76,7 @@ void VisitMembers(Visit& visit, typename Visit::template Of<SdfSource::Place>& p
 }
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<SdfSource::Include>& include) {
-  visit(include.uri), visit(include.file);
+  visit(include.uri), visit(include.file), visit(include.text);
 }
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<SdfSource>& source) {

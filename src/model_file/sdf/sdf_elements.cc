@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -257,6 +258,82 @@ int DepthBelow(const XMLElement& element) {
     deepest = std::max(deepest, 1 + DepthBelow(*e));
   }
   return deepest;
+}
+
+// libsdformat 12 reads SDF up to 1.9; what came later is read as 1.9, with the new elements.
+std::string AsKnownVersion(std::string text) {
+  const size_t sdf = text.find("<sdf");
+  const size_t version = text.find("version", sdf);
+  const size_t end = sdf == std::string::npos ? sdf : text.find('>', sdf);
+  if (version == std::string::npos || version > end) return text;
+  const size_t one = text.find("1.1", version);
+  if (one == std::string::npos || one > end || one + 3 >= end) return text;
+  if (text[one + 3] >= '0' && text[one + 3] <= '9') text.replace(one, 4, "1.9");
+  return text;
+}
+
+// The > of the tag that begins at `at`; npos without one.
+size_t EndOfTag(const std::string& text, size_t at) {
+  char quote = '\0';
+  for (; at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote != '\0') {
+      if (c == quote) quote = '\0';
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '>') {
+      return at;
+    }
+  }
+  return std::string::npos;
+}
+
+// True for what libsdformat need not see: no force depends on it, and no picture.
+bool IsIdle(const std::string& element) {
+  const SdfRow* row = FindSdfRow(element, "**");
+  return (row != nullptr && row->fate == kNoForce) || element == "material/script";
+}
+
+// A file with blanks in place of what is idle, on the same lines: libsdformat 12 refuses files
+// whose sensors, materials or surfaces it does not know or finds faults in. `text` is well-formed.
+std::string LeanText(std::string text) {
+  std::vector<std::string> open;    // tags
+  std::optional<size_t> idle_from;  // where the outermost idle element begins
+  size_t idle_depth = 0;
+  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at)) {
+    const auto skipped = [&](std::string_view begin, std::string_view end) {
+      if (text.compare(at, begin.size(), begin) != 0) return false;
+      at = std::min(text.find(end, at), text.size());
+      return true;
+    };
+    if (skipped("<!--", "-->") || skipped("<![CDATA[", "]]>") || skipped("<?", "?>") ||
+        skipped("<!", ">")) {
+      continue;
+    }
+    const size_t close = EndOfTag(text, at);
+    if (close == std::string::npos) return text;
+    const bool ends = text[at + 1] == '/', empty = text[close - 1] == '/';
+    if (!ends) {
+      const size_t end = text.find_first_of(" \t\r\n/>", at + 1);
+      const std::string tag = text.substr(at + 1, end - at - 1);
+      const std::string element = open.empty() ? tag : open.back() + "/" + tag;
+      open.push_back(tag);
+      if (!idle_from && IsIdle(element)) {
+        idle_from = at;
+        idle_depth = open.size();
+      }
+    }
+    at = close + 1;
+    if (!ends && !empty) continue;
+    if (idle_from && open.size() == idle_depth) {
+      for (size_t i = *idle_from; i < at; ++i) {
+        if (text[i] != '\n') text[i] = ' ';
+      }
+      idle_from.reset();
+    }
+    if (!open.empty()) open.pop_back();
+  }
+  return text;
 }
 
 class Inspector {
@@ -517,6 +594,17 @@ class Inspector {
     return newest.second;
   }
 
+  // A file, or the one that a model's folder names.
+  [[nodiscard]] FoundMesh FindIncluded(const std::string& uri) const {
+    FoundMesh found = FindMesh(uri, root_);
+    if (!found.path.empty() || found.outside) return found;
+    const FoundMesh config = FindMesh(uri + "/model.config", root_);
+    const std::string model = config.path.empty() ? "" : FileOfModel(config.path);
+    if (!model.empty()) found = FindMesh(uri + "/" + model, root_);
+    found.outside = found.outside || config.outside;
+    return found;
+  }
+
   void Include(const XMLElement& e, const std::string& scope) {
     constexpr size_t kMostIncludes = 100;
     const XMLElement* uri_element = e.FirstChildElement("uri");
@@ -533,12 +621,10 @@ class Inspector {
       }
       return;
     }
-    FoundMesh found = FindMesh(FromRoot(uri), root_);
-    if (found.path.empty() && !found.outside) {
-      const FoundMesh config = FindMesh(FromRoot(uri + "/model.config"), root_);
-      const std::string model = config.path.empty() ? "" : FileOfModel(config.path);
-      if (!model.empty()) found = FindMesh(FromRoot(uri + "/" + model), root_);
-      found.outside = found.outside || config.outside;
+    FoundMesh found = FindIncluded(FromRoot(uri));
+    // Gazebo looks a bare name up as a model's.
+    if (found.path.empty() && !found.outside && uri.find_first_of(":/.") == std::string::npos) {
+      found = FindIncluded("model://" + uri);
     }
     const auto text = found.path.empty() ? std::nullopt : ReadWholeFile(found.path);
     if (!text) {
@@ -557,7 +643,7 @@ class Inspector {
     }
     const auto known = std::ranges::find(source_.includes, uri, &SdfSource::Include::uri);
     if (known == source_.includes.end()) {
-      source_.includes.push_back({uri, path.string()});
+      source_.includes.push_back({uri, path.string(), AsKnownVersion(LeanText(*text))});
     } else if (known->file != path.string()) {
       Refuse(file_, line, fmt::format("{} is also another file, {}", says, known->file),
              "give one of them another name");
@@ -579,18 +665,6 @@ class Inspector {
   size_t includes_ = 0;
   std::map<std::pair<std::string, std::string>, Loss> losses_;
 };
-
-// libsdformat 12 reads SDF up to 1.9; what came later is read as 1.9, with the new elements.
-std::string AsKnownVersion(std::string text) {
-  const size_t sdf = text.find("<sdf");
-  const size_t version = text.find("version", sdf);
-  const size_t end = sdf == std::string::npos ? sdf : text.find('>', sdf);
-  if (version == std::string::npos || version > end) return text;
-  const size_t one = text.find("1.1", version);
-  if (one == std::string::npos || one > end || one + 3 >= end) return text;
-  if (text[one + 3] >= '0' && text[one + 3] <= '9') text.replace(one, 4, "1.9");
-  return text;
-}
 
 }  // namespace
 
@@ -618,7 +692,6 @@ ModelCaveat LeftOutOfSdf(std::string_view element, std::string_view value,
 std::optional<SdfSource> InspectSdf(const std::string& text, const std::string& file,
                                     Diagnostics* diagnostics) {
   SdfSource source;
-  source.text = AsKnownVersion(text);
   source.file = file;
   source.folder = fs::absolute(file).parent_path().string();
   for (const MeshPackage& package : MeshPackages()) {
@@ -631,6 +704,7 @@ std::optional<SdfSource> InspectSdf(const std::string& text, const std::string& 
   inspector.Report();
   diagnostics->Append(found);
   if (found.has_errors()) return std::nullopt;
+  source.text = AsKnownVersion(LeanText(text));  // it is well-formed
   return source;
 }
 

@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <ranges>
 #include <sdf/sdf.hh>
 #include <set>
 #include <sstream>
@@ -38,6 +39,19 @@ Pose ToPose(const ignition::math::Pose3d& p) {
                    .normalized()
                    .toRotationMatrix();
   return X;
+}
+
+// Where an included file's text is put for libsdformat, in the working folder.
+fs::path CopyOf(const SdfSource& source, const SdfSource::Include& include) {
+  return fs::absolute(fmt::format("include{}.sdf", &include - source.includes.data()));
+}
+
+// The file that was included, of its copy's path.
+std::string OriginalOf(const SdfSource& source, const std::string& path) {
+  for (const SdfSource::Include& include : source.includes) {
+    if (path == CopyOf(source, include)) return include.file;
+  }
+  return path;
 }
 
 class SdfImporter {
@@ -282,7 +296,7 @@ class SdfImporter {
   bool AddMesh(const sdf::Mesh& mesh, const Pose& X, Shape* shape) {
     ++meshes_;
     std::string name = mesh.Uri();
-    const fs::path from(mesh.FilePath());  // of the included file
+    const fs::path from(OriginalOf(source_, mesh.FilePath()));  // of the included file
     if (from.is_absolute() && name.find("://") == std::string::npos) {
       name = (from.parent_path().lexically_proximate(source_.folder) / name).string();
     }
@@ -420,6 +434,28 @@ class SdfImporter {
     return value != nullptr && value->Get(x) ? x : kNan;
   }
 
+  // Where the limits of one of two axes are equal, the other one is a hinge: its number, else 0.
+  int HoldAxis(const sdf::Joint& from, const std::string& what, Joint* joint) {
+    for (const int k : {0, 1}) {
+      const sdf::JointAxis& axis = *from.Axis(static_cast<unsigned>(k));
+      const double at = axis.Lower();
+      if (at != axis.Upper() || !std::isfinite(at)) continue;
+      Warn(what, fmt::format("axis {} of joint '{}' is held at {:g}: its limits leave nothing else",
+                             k + 1, joint->name, at));
+      const Vec3 held = k == 0 ? joint->axis : joint->axis2;
+      const Mat3 R = Eigen::AngleAxisd(at, held).toRotationMatrix();
+      if (k == 0) {
+        joint->X_PF.linear() = joint->X_PF.linear() * R;
+        joint->axis = joint->axis2;
+      } else {
+        joint->X_CM.linear() = joint->X_CM.linear() * R.transpose();
+      }
+      joint->kind = JointKind::kRevolute;
+      return 1 - k;
+    }
+    return 0;
+  }
+
   void Store(const Waiting& of, const sdf::Joint& from, Joint joint) {
     const int index = static_cast<int>(m_.joints.size());
     const std::string what = "joint " + of.scope + from.Name();
@@ -427,9 +463,10 @@ class SdfImporter {
     if (from.Type() == sdf::JointType::SCREW && !AddScrew(from, joint.name, what)) return;
     // The coordinate of a screw that SDF means is its angle.
     const int first = from.Type() == sdf::JointType::SCREW ? 1 : 0;
+    const int own_axis = joint.kind == JointKind::kUniversal ? HoldAxis(from, what, &joint) : 0;
     const int dofs = joint.kind == JointKind::kSpherical ? 0 : DofsOf(joint.kind);
     for (int k = first; k < dofs; ++k) {
-      const sdf::JointAxis& axis = *from.Axis(static_cast<unsigned>(k - first));
+      const sdf::JointAxis& axis = *from.Axis(static_cast<unsigned>(k - first + own_axis));
       if (from.Type() != sdf::JointType::CONTINUOUS) ReadLimits(axis, k, what, &joint);
       if (joint.kind != JointKind::kFixed) AddElements(axis, index, k, joint);
     }
@@ -452,8 +489,8 @@ class SdfImporter {
            .law = RotorLaw{.inertia = inertia, .ratio = std::isnan(ratio) ? 1.0 : ratio}});
     }
     if (dofs - first == 1 && joint.kind != JointKind::kFixed) {
-      scalars_.push_back(
-          {index, first, from.Name(), from.Axis(0)->Effort(), from.Axis(0)->MaxVelocity()});
+      const sdf::JointAxis& own = *from.Axis(static_cast<unsigned>(own_axis));
+      scalars_.push_back({index, first, from.Name(), own.Effort(), own.MaxVelocity()});
     }
     index_[of.scope + from.Name()] = index;
     m_.joints.push_back(std::move(joint));
@@ -778,7 +815,7 @@ const SdfSource::Place* PlaceQuoted(const SdfSource& source, const std::string& 
 }
 
 Finding FindingOf(const sdf::Error& error, const SdfSource& source) {
-  const std::string file = error.FilePath().value_or("");  // none of a text
+  const std::string file = OriginalOf(source, error.FilePath().value_or(""));  // none of a text
   Finding finding{.severity = Severity::kError, .file = source.file, .message = {}, .hint = {}};
   if (!file.empty() && file.front() == '/') finding.file = file;
   finding.line = std::max(0, error.LineNumber().value_or(0));
@@ -813,6 +850,19 @@ void AddErrors(const sdf::Errors& errors, const SdfSource& source, Diagnostics* 
   for (const sdf::Error* error : own.empty() ? others : own) found->Add(FindingOf(*error, source));
 }
 
+// An included file for libsdformat, which loses what is merged into a file that is merged itself:
+// such a file is written out with its parts. "" or what went wrong.
+std::string WriteCopy(const SdfSource& source, const SdfSource::Include& include,
+                      const sdf::ParserConfig& config) {
+  const fs::path copy = CopyOf(source, include);
+  const std::string trouble = WriteFile(copy, include.text);
+  if (!trouble.empty() || include.text.find("merge") == std::string::npos) return trouble;
+  const sdf::SDFPtr whole(new sdf::SDF());
+  sdf::Errors errors;
+  if (!sdf::init(whole) || !sdf::readFile(copy.string(), config, whole, errors)) return "";
+  return WriteFile(copy, whole->ToString());
+}
+
 ForeignModel AnswerOf(const SdfSource& source) {
   Diagnostics found;
   std::vector<MeshPackage> packages;
@@ -837,10 +887,15 @@ ForeignModel AnswerOf(const SdfSource& source) {
   sdf::ParserConfig config;
   config.SetFindCallback([&](const std::string& uri) {
     const auto include = std::ranges::find(source.includes, uri, &SdfSource::Include::uri);
-    return include == source.includes.end() ? std::string() : include->file;
+    return include == source.includes.end() ? std::string() : CopyOf(source, *include).string();
   });
   config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::LOG);
   config.SetDeprecatedElementsPolicy(sdf::EnforcementPolicy::LOG);
+  // The innermost come last.
+  for (const SdfSource::Include& include : std::views::reverse(source.includes)) {
+    const std::string trouble = WriteCopy(source, include, config);
+    if (!trouble.empty()) found.AddError(include.file, trouble);
+  }
   sdf::Root root;
   if (!found.has_errors()) AddErrors(root.LoadSdfString(source.text, config), source, &found);
   if (found.has_errors()) {

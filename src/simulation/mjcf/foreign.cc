@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <tinyxml2.h>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <iterator>
 #include <map>
@@ -16,6 +18,7 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "model_file/mesh/read_mesh.h"
 #include "simulation/mjcf/foreign_frames.h"
 #include "simulation/mjcf/foreign_rows.h"
 
@@ -29,6 +32,8 @@ using tinyxml2::XMLElement;
 
 constexpr int kDeepest = 200;  // nesting of elements
 constexpr size_t kMostNames = 6;
+constexpr const char* kOpenFolders =
+    "in the model's folder or below, or in a folder that --package NAME=DIR names";
 
 // What a row's element and attribute are called in findings.
 std::string NameOf(const std::string& element, const std::string& attribute) {
@@ -62,7 +67,7 @@ int DepthOf(const XMLElement* element) {
 struct ForeignMjcf::Impl {
   XMLDocument document;
   fs::path file, folder;
-  fs::path top;                  // folder of the whole, of which no file lies outside
+  fs::path top;                  // folder of the whole
   std::vector<fs::path> around;  // files of models that this one is attached to
   std::vector<AttachedKey> attached_keys;
   Diagnostics* diagnostics = nullptr;
@@ -78,13 +83,7 @@ struct ForeignMjcf::Impl {
 
   XMLElement* root() { return document.RootElement(); }
 
-  // The path of a file that the model names, if it lies below the model's folder.
-  [[nodiscard]] bool IsBelow(const fs::path& path) const {
-    std::error_code error;
-    const fs::path base = fs::weakly_canonical(top, error);
-    const fs::path inside = fs::weakly_canonical(path, error).lexically_relative(base);
-    return !error && !inside.empty() && *inside.begin() != "..";
-  }
+  [[nodiscard]] bool IsOpen(const fs::path& path) const { return MayBeNamed(path, top); }
 
   void Parse(const std::string& text) {
     good = true;
@@ -129,13 +128,13 @@ struct ForeignMjcf::Impl {
   void TakeInclude(XMLElement* include) {
     const char* name = include->Attribute("file");
     const fs::path path = folder / (name == nullptr ? "" : name);
-    const auto text = IsBelow(path) ? ReadWholeFile(path) : std::nullopt;
+    const auto text = IsOpen(path) ? ReadWholeFile(path) : std::nullopt;
     XMLDocument other;
     if (!text || other.Parse(text->c_str(), text->size()) != tinyxml2::XML_SUCCESS ||
         other.RootElement() == nullptr || DepthOf(other.RootElement()) > kDeepest) {
       Add(Severity::kError, include->GetLineNum(),
           fmt::format("include '{}' cannot be read", name == nullptr ? "" : name),
-          "it must be an XML file in the model's folder or below");
+          fmt::format("it must be an XML file {}", kOpenFolders));
       return;
     }
     tinyxml2::XMLNode* parent = include->Parent();
@@ -198,11 +197,11 @@ struct ForeignMjcf::Impl {
     model.top = top;
     model.around = around;
     model.around.push_back(fs::weakly_canonical(file));
-    const auto text = IsBelow(model.file) ? ReadWholeFile(model.file) : std::nullopt;
+    const auto text = IsOpen(model.file) ? ReadWholeFile(model.file) : std::nullopt;
     if (!text) {
       return Add(Severity::kError, attach->GetLineNum(),
                  fmt::format("<attach> model '{}': file '{}' cannot be read", name, path),
-                 "it must be an MJCF file in the model's folder or below");
+                 fmt::format("it must be an MJCF file {}", kOpenFolders));
     }
     if (std::ranges::find(model.around, fs::weakly_canonical(model.file)) != model.around.end()) {
       return Add(Severity::kError, attach->GetLineNum(),
@@ -246,7 +245,7 @@ struct ForeignMjcf::Impl {
   }
 
   [[nodiscard]] std::string ModelNameOf(const fs::path& path) const {
-    const auto text = IsBelow(path) ? ReadWholeFile(path) : std::nullopt;
+    const auto text = IsOpen(path) ? ReadWholeFile(path) : std::nullopt;
     XMLDocument model;
     if (!text || model.Parse(text->c_str(), text->size()) != tinyxml2::XML_SUCCESS) return "";
     const char* name =
@@ -257,11 +256,11 @@ struct ForeignMjcf::Impl {
   // What dynamics without contacts do not need.
   void DropPictures() {
     MeshGeoms geoms = TakeMeshGeoms(
-        MeshFolder(), [this](const fs::path& path) { return IsBelow(path); }, &document);
+        MeshFolder(), [this](const fs::path& path) { return IsOpen(path); }, &document);
     meshes = std::move(geoms.meshes);
     if (geoms.lost > 0) {
       Add(Severity::kWarning, 0, fmt::format("{} meshes are left out of the pictures", geoms.lost),
-          "meshes of files in the model's folder or below are drawn");
+          fmt::format("meshes of files {} are drawn", kOpenFolders));
     }
     for (const MeshGeoms::Missing& missing : geoms.missing) {
       Add(Severity::kError, missing.line,
@@ -320,12 +319,39 @@ struct ForeignMjcf::Impl {
       if (name.empty() && from != nullptr) name = fs::path(from).stem().string();
       if (used.count(name) == 0) {
         unused.push_back(e);
-      } else if (from != nullptr && !IsBelow(MeshFolder() / from)) {
+      } else if (from != nullptr && !IsOpen(MeshFolder() / from)) {
         Add(Severity::kError, e->GetLineNum(),
-            fmt::format("mesh '{}' lies outside the model's folder", from));
+            fmt::format("mesh '{}' lies outside the model's folder", from),
+            fmt::format("it must be a file {}", kOpenFolders));
       }
     });
     for (XMLElement* e : unused) document.DeleteNode(e);
+  }
+
+  // MuJoCo 2.2 finds the principal axes of a full tensor to six digits: they are stated instead.
+  void StatePrincipalAxes() {
+    ForEach(root(), [](XMLElement* e) {
+      const char* full = IsTag(e, "inertial") ? e->Attribute("fullinertia") : nullptr;
+      if (full == nullptr) return;
+      for (const char* orientation : {"quat", "axisangle", "xyaxes", "zaxis", "euler"}) {
+        if (e->Attribute(orientation) != nullptr) return;  // an error of the compiler's
+      }
+      std::istringstream text(full);
+      std::array<double, 6> I{};
+      for (double& value : I) text >> value;
+      Mat3 tensor;
+      tensor << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
+      if (text.fail() || !tensor.allFinite()) return;
+      const Eigen::SelfAdjointEigenSolver<Mat3> principal(tensor);
+      const Vec3 d = principal.eigenvalues();
+      if (!(d.minCoeff() > 0.0)) return;
+      Mat3 axes = principal.eigenvectors();
+      if (axes.determinant() < 0.0) axes.col(2) *= -1.0;
+      const Eigen::Quaterniond q(axes);
+      e->DeleteAttribute("fullinertia");
+      e->SetAttribute("diaginertia", fmt::format("{} {} {}", d[0], d[1], d[2]).c_str());
+      e->SetAttribute("quat", fmt::format("{} {} {} {}", q.w(), q.x(), q.y(), q.z()).c_str());
+    });
   }
 
   XMLElement* Compiler() {
@@ -784,6 +810,7 @@ ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnost
   if (ok()) impl_->SwitchOff();
   if (ok()) impl_->TranslateWords();
   if (ok()) impl_->WriteOutFrames();
+  if (ok()) impl_->StatePrincipalAxes();
   if (ok()) impl_->DropPictures();
   if (ok()) impl_->LookUpAll();  // what only serves pictures needs no word
   if (ok()) impl_->CarryThrough();

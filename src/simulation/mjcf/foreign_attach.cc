@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <map>
 #include <numbers>
 #include <set>
 #include <string_view>
@@ -467,11 +468,31 @@ class Grafter {
     return section;
   }
 
+  // Classes of both models may share names: MuJoCo 3 lets each keep its own.
+  void NameClassesApart(const std::set<std::string>& known) {
+    const XMLElement* all = root()->FirstChildElement("default")->FirstChildElement("default");
+    const std::string main = Text(all->Attribute("class"));
+    const bool again = known.contains(main);  // the same model once more under the same prefix
+    std::map<std::string, std::string> names;
+    ForEach(root(), [&](XMLElement* e) {
+      if (!IsTag(e, "default") || e->Attribute("class") == nullptr || e == all) return;
+      const std::string own = e->Attribute("class"), apart = own + " of " + main;
+      if (known.contains(again ? apart : own)) names[own] = apart;
+    });
+    ForEach(root(), [&](XMLElement* e) {
+      for (const char* attribute : {"class", "childclass"}) {
+        const auto found = names.find(Text(e->Attribute(attribute)));
+        if (found != names.end()) e->SetAttribute(attribute, found->second.c_str());
+      }
+    });
+  }
+
   void Move() {
     std::set<std::string> classes;
     ForEach(into_.RootElement(), [&](XMLElement* e) {
       if (IsTag(e, "default") && e->Attribute("class")) classes.insert(e->Attribute("class"));
     });
+    if (!is_own_) NameClassesApart(classes);
     for (const char* name : {"default", "asset", "tendon", "contact", "equality", "actuator"}) {
       const std::string_view section = name;
       if (is_own_ && (section == "default" || section == "asset")) continue;

@@ -79,6 +79,49 @@ TEST(Survey, EachFaultHasItsStatus) {
 }
 
 // The status is the finding's code, whatever names its message holds.
+// A shin and a leaf beside it turn about two points of a thigh, 35 mm apart, and slide on each
+// other across the line between these: rigid but for one instant.
+std::string LeafSpring(double off) {
+  const auto link = [](const std::string& name, double x, double z) {
+    return fmt::format(
+        "<link name='{}'><pose>{} 0 {} 0 0 0</pose><inertial><pose>.1 0 0 0 0 0</pose><mass>1"
+        "</mass><inertia><ixx>.01</ixx><iyy>.01</iyy><izz>.01</izz></inertia></inertial></link>",
+        name, x, z);
+  };
+  const auto joint = [](const std::string& name, const std::string& parent,
+                        const std::string& child, const std::string& rest) {
+    return fmt::format("<joint name='{}' {}<parent>{}</parent><child>{}</child></joint>", name,
+                       rest, parent, child);
+  };
+  const std::string hinge = "type='revolute'><axis><xyz>0 1 0</xyz></axis>";
+  return "<sdf version='1.7'><model name='leg'>" + link("thigh", 0, 1) + link("shin", 0.3, 1) +
+         link("leaf", 0.3 + off, 1.035) + joint("hip", "world", "thigh", hinge) +
+         joint("knee", "thigh", "shin", hinge) + joint("root", "thigh", "leaf", hinge) +
+         joint("slide", "shin", "leaf", "type='prismatic'><axis><xyz>1 0 0</xyz></axis>") +
+         "</model></sdf>";
+}
+
+TEST(Survey, LoopsThatRoundingAloneHoldsAreAFaultOfTheFile) {
+  const test::TestFolder folder("survey_dead_point");
+  const SurveyRow row =
+      SurveyFile(folder.Write("r.sdf", LeafSpring(-1.5e-6)), folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "refused");
+  EXPECT_NE(row.message.find("'slide' stand at a dead point"), std::string::npos) << row.message;
+  for (const char* joint : {"knee", "root"}) {
+    EXPECT_NE(row.message.find(joint), std::string::npos) << row.message;
+  }
+}
+
+// Few digits are no licence to make another mechanism of it.
+TEST(Survey, FramesMoveNoFartherThanDigitsExplain) {
+  const test::TestFolder folder("survey_reach");
+  const SurveyRow row =
+      SurveyFile(folder.Write("r.sdf", LeafSpring(-0.01)), folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  EXPECT_EQ(row.dofs, 1);
+  EXPECT_TRUE(row.caveats.empty()) << row.caveats.front();
+}
+
 TEST(Survey, ALinkNamedAsAFaultIsNotThatFault) {
   const test::TestFolder folder("survey_names");
   std::string robot = "<robot name=\"r\">" + UrdfLink("base", 0.5) +
