@@ -28,7 +28,7 @@ constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]
 constexpr int kMostStrides = 10000;
 constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
 constexpr double kMostCorners = 4e6;
-constexpr size_t kKeptAtOnce = 4096;  // of corners or cuts that are kept at once
+constexpr size_t kKeptAtOnce = 1024;  // of corners or cuts that are kept at once
 constexpr std::array<int, 4> kUsualResolution = {0, 400, 240, 64};
 
 struct LatticeHash {
@@ -106,6 +106,11 @@ class Flooder {
         CutEdges(level);
         set_.levels.push_back(Measure(level, level == settings_.halvings));
       }
+    }
+    if (InVain()) {
+      set_.summary.stop = Stop::kNoConvergence;
+      set_.summary.message = "it was given up";
+      return std::move(set_);
     }
     if (std::ranges::none_of(corners_, [](const auto& known) { return known.second.inside; })) {
       set_.summary.stop = Stop::kUnreachable;
@@ -258,7 +263,7 @@ class Flooder {
                         const std::function<void(double)>& progress = {}) {
     std::vector<T> all;
     all.reserve(count);
-    for (size_t first = 0; first < count; first += kKeptAtOnce) {
+    for (size_t first = 0; first < count && !InVain(); first += kKeptAtOnce) {
       const size_t size = std::min(kKeptAtOnce, count - first);
       auto [results, closings] = log_.Get<std::pair<std::vector<T>, long>>([&] {
         std::vector<T> computed(size);
@@ -272,8 +277,10 @@ class Flooder {
       closings_ += closings;
       if (progress) progress(static_cast<double>(first + size) / static_cast<double>(count));
     }
+    all.resize(count);
     return all;
   }
+  [[nodiscard]] bool InVain() const { return settings_.in_vain != nullptr && *settings_.in_vain; }
 
   template <typename F>
   void ForEachCorner(const F& f, int most = 1) const {

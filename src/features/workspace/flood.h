@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <string>
 #include <vector>
@@ -25,6 +26,7 @@ struct FloodSettings {
   int halvings = 2;        ///< of cells at the boundary, 1 … 4
   int threads = 1;         ///< nothing depends on it
   double most_s = 1200.0;  ///< an estimate beyond refuses
+  const std::atomic<bool>* in_vain = nullptr;  ///< once true, the result has no use
 };
 
 /// A triangle (3-D), line (2-D) or point (1-D) of the boundary.

@@ -239,8 +239,8 @@ VecX PoseSpace::Target(const VecX& x) const {
 }
 
 // Newton's method: the least step to (1), and motions (2) to the coordinates.
-bool PoseSpace::Correct(const PlacedPose& from, const VecX& target, double most,
-                        PlacedPose* to) const {
+bool PoseSpace::Correct(const PlacedPose& from, const VecX& target, double most, PlacedPose* to,
+                        const OnBound* on) const {
   ++closings_;
   const auto d = static_cast<Eigen::Index>(settings_.coordinates.size());
   const Eigen::Index over = settings_.over;
@@ -267,16 +267,26 @@ bool PoseSpace::Correct(const PlacedPose& from, const VecX& target, double most,
     }
     // All coordinates, or those that are held.
     const Eigen::Index first = target.size() > 0 ? 0 : over, asked = d - first;
-    if (asked > 0) {
+    if (asked > 0 || on != nullptr) {
       VecX miss(asked);
       for (Eigen::Index k = 0; k < asked; ++k) {
         const double goal = target.size() > 0 ? target[k] : settings_.held[k];
         miss[k] = (goal - rows.at[first + k]) / UnitOf(static_cast<int>(first + k));
       }
-      const MatX C = rows.C.bottomRows(asked);
+      MatX C = rows.C.bottomRows(asked);
+      if (on != nullptr) {
+        Eigen::RowVectorXd rate;
+        const double margin = MarginOf(on->bound, to->pose, rows, &rate);
+        C.conservativeResize(d, Eigen::NoChange);
+        C.row(asked) = rate;
+        C.row(asked + 1) = on->along.transpose();
+        miss.conservativeResize(d);
+        miss[asked] = -margin;
+        miss[asked + 1] = 0.0;
+      }
       miss -= C * step;
       const MatX G = C * rows.N;
-      if (asked == d) {
+      if (miss.size() == d) {
         step += rows.N * G.partialPivLu().solve(miss);
       } else {
         step += rows.N * G.transpose() * (G * G.transpose()).ldlt().solve(miss);
@@ -293,6 +303,23 @@ bool PoseSpace::Correct(const PlacedPose& from, const VecX& target, double most,
   return false;
 }
 
+double PoseSpace::MarginOf(int bound, const SpacePose& pose, const Rows& rows,
+                           Eigen::RowVectorXd* rate) const {
+  const SetBound& of = bounds_[static_cast<size_t>(bound)];
+  const double sign = of.upper ? -1.0 : 1.0;
+  if (of.kind == SetBound::Kind::kBox) {
+    const double unit = UnitOf(of.watched);
+    *rate = sign * rows.C.row(of.watched);
+    return sign * (rows.at[of.watched] - of.limit) / unit;
+  }
+  const Coordinate& coordinate = watched_[static_cast<size_t>(of.watched)].coordinate;
+  const ScalarRow row =
+      CoordinateRow(*mechanism_, coordinate, rows.states, pose.watched[of.watched]);
+  const double unit = IsLength(*mechanism_, coordinate) ? length_ : 1.0;
+  *rate = sign * Projected(row, rows.J) / unit;
+  return sign * (row.value - of.limit) / unit;
+}
+
 bool PoseSpace::Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const {
   const Mechanism& m = *mechanism_;
   SpacePose& pose = to->pose;
@@ -303,7 +330,8 @@ bool PoseSpace::Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const {
   }
   to->N = rows->N;
   pose.at = rows->at;
-  const MatX G = rows->C * rows->N;
+  to->G.noalias() = rows->C * rows->N;
+  const MatX& G = to->G;
   const Eigen::Index over = settings_.over, held = G.rows() - over;
   to->type1 = pose.side * G.determinant() / home_type1_;
   const double first = rank_ > 0 ? std::abs(rows->qr.matrixQR()(0, 0)) : 1.0;
@@ -431,15 +459,24 @@ bool PoseSpace::Step(const PlacedPose& from, const VecX& along, PlacedPose* to) 
   return true;
 }
 
+bool PoseSpace::StepOn(int bound, const PlacedPose& from, double tau, const VecX& t,
+                       PlacedPose* to) const {
+  PlacedPose next;
+  next.pose = from.pose;
+  const OnBound on{bound, from.N_free * t};
+  Move(tau * on.along, &next.pose);
+  if (!Correct(from, {}, kTrusted * std::abs(tau) + 1e-3, &next, &on)) return false;
+  *to = std::move(next);
+  return true;
+}
+
 bool PoseSpace::CloseOnce(const PlacedPose& from, const VecX& target, PlacedPose* to) const {
   // The first step of Newton's method is the tangent.
   VecX miss = target - from.pose.at;
   for (Eigen::Index k = 0; k < miss.size(); ++k) miss[k] /= UnitOf(static_cast<int>(k));
   PlacedPose next;
   next.pose = from.pose;
-  Rows rows;
-  Evaluate(&next.pose, &rows);
-  const VecX along = (rows.C * from.N).partialPivLu().solve(miss);
+  const VecX along = from.G.partialPivLu().solve(miss);
   if (!along.allFinite() || along.norm() > kLongStep) return false;
   Move(from.N * along, &next.pose);
   if (!Correct(from, target, kTrusted * along.norm() + 1e-6, &next)) return false;

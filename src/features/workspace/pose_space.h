@@ -64,6 +64,11 @@ struct SetBound {
   return kind >= SetBound::Kind::kConstraint;
 }
 
+/// The rate of the margin is known without differences.
+[[nodiscard]] inline bool HasRate(SetBound::Kind kind) {
+  return kind < SetBound::Kind::kCone || kind == SetBound::Kind::kBox;
+}
+
 /// The axis a of M in a joint stays within an angle of the same axis in F.
 struct JointCone {
   int joint = -1;
@@ -110,6 +115,7 @@ struct PlacedPose {
   SpacePose pose;
   MatX N;               ///< n × d, (2)
   MatX N_free;          ///< n × over: those of N that leave the held coordinates
+  MatX G;               ///< d × d, (3): scaled by UnitOf()
   MatX C_free;          ///< over × over: rates of the free coordinates [m or rad] along N_free
   MatX watched_free;    ///< watched × over
   double type1 = kNan;  ///< det G, 1 at home
@@ -147,6 +153,10 @@ class PoseSpace {
   /// The nearest pose beyond a step of `along` N_free [rad, characteristic lengths] that keeps the
   /// held coordinates; smooth in `along`. False where none is near.
   [[nodiscard]] bool Step(const PlacedPose& from, const VecX& along, PlacedPose* to) const;
+  /// Of two free coordinates and a bound that HasRate(): the pose on it beyond a step τ N_free t,
+  /// corrected across t only; smooth in τ. A few times as fast as a search by Step().
+  [[nodiscard]] bool StepOn(int bound, const PlacedPose& from, double tau, const VecX& t,
+                            PlacedPose* to) const;
   /// The pose with other values of all d coordinates, in steps so short that it is the same branch.
   /// False where it does not close, or a fold (type 1) lies between.
   [[nodiscard]] bool Close(const PlacedPose& from, const VecX& target, PlacedPose* to) const;
@@ -176,10 +186,18 @@ class PoseSpace {
   /// Rows (1) and the coordinates at a pose.
   void Evaluate(SpacePose* pose, Rows* rows) const;
   [[nodiscard]] bool Factor(Rows* rows) const;
+  /// Of a step on a bound: which one, and the direction in which corrections do not move.
+  struct OnBound {
+    int bound = -1;
+    VecX along;
+  };
   /// From a predicted pose to one that closes; `target` of all coordinates or, empty, of those
   /// held.
   [[nodiscard]] bool Correct(const PlacedPose& from, const VecX& target, double most,
-                             PlacedPose* to) const;
+                             PlacedPose* to, const OnBound* on = nullptr) const;
+  /// A linear bound's margin at a pose, and its rate by scaled steps of the tree.
+  [[nodiscard]] double MarginOf(int bound, const SpacePose& pose, const Rows& rows,
+                                Eigen::RowVectorXd* rate) const;
   [[nodiscard]] bool Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const;
   [[nodiscard]] bool CloseOnce(const PlacedPose& from, const VecX& target, PlacedPose* to) const;
   void Move(const VecX& scaled, SpacePose* pose) const;

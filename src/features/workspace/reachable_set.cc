@@ -667,7 +667,9 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     return result;
   }
   // Both ways at once; neither knows of the other.
-  const FloodSettings& flood = arguments.flood;
+  FloodSettings flood = arguments.flood;
+  std::atomic<bool> in_vain = false;
+  flood.in_vain = &in_vain;
   const auto log = [&](const char* name) {
     return folder == nullptr ? ResultLog() : folder->Log(name);
   };
@@ -679,6 +681,7 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
             ? TraceSet(space, start, report, which.share, flood.threads, log("boundary"))
             : TraceRange(space, start, flood.threads, report, log("boundary"));
     of_trace = 1.0;
+    in_vain = !result.traced.summary.ok();
   };
   const auto fill = [&] {
     result.flooded = FloodSet(

@@ -25,11 +25,12 @@ using std::numbers::pi;
 constexpr int kDegree = 8;           // of the polynomials along a step
 constexpr double kTail = 1e-9;       // last coefficients by the size of the set
 constexpr double kBeyond = 1e-9;     // margins below −this are outside
+constexpr double kDip = 1e-8;        // the same between two nodes, by their polynomial
 constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
 constexpr double kFar = 200.0;  // a ray that goes on for so long has no end
-constexpr int kMostSteps = 20000;
+constexpr int kMostSteps = 20000, kMostCurveSteps = 800;  // of a path, of a loop
 constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
 constexpr int kSpreadRows = 6;
 constexpr int kRays = 8, kChords = 12;  // from home; from each loop
@@ -38,6 +39,7 @@ constexpr size_t kMostSections = 1200;
 constexpr double kRough = 1e-3;
 constexpr long kEnoughClosings = 1000000, kMostClosings = 6000000;
 constexpr double kEndsShare = 0.1;   // of the progress
+constexpr double kSliver = 1e-3;     // of a part, within which its ends are known
 constexpr double kMoved = 0.02;      // of a solid's height, by which its ends have moved
 constexpr size_t kNearSections = 2;  // on each side, whose poses begin another one
 
@@ -66,6 +68,7 @@ double Root(const F& f, double a, double fa, double b, double fb, double toleran
 struct Chebyshev {
   std::array<double, kDegree + 1> node{};
   Eigen::MatrixXd area;                 // ∫ l_a l_b′
+  Eigen::MatrixXd dense;                // values at these nodes and between any two
   Eigen::RowVectorXd last, one_before;  // coefficients of T_n and T_{n−1}
 
   Chebyshev() {
@@ -100,7 +103,8 @@ struct Chebyshev {
       }
       weight[k] = (k == 0 || k == fine ? 1.0 : 2.0) * sum / fine;
     }
-    area = (P * coefficients).transpose() * weight.asDiagonal() * (Q * coefficients);
+    dense = P * coefficients;
+    area = dense.transpose() * weight.asDiagonal() * (Q * coefficients);
   }
 };
 const Chebyshev& Nodes() {
@@ -219,6 +223,9 @@ class Tracer {
     double slope, rate;  // of the margin along n: slope + rate τ, about
   };
   bool OnCurve(const Curve& curve, double tau, double* eta, PlacedPose* to) const {
+    if (HasRate(space_.bounds()[static_cast<size_t>(curve.bound)].kind)) {
+      return space_.StepOn(curve.bound, *curve.base, tau, curve.t, to);
+    }
     double x0 = *eta, f0 = 0.0, x1 = *eta;
     // Margins have the rounding of numbers about 1.
     const double within = std::max(1e-13, 4 * kEps / (curve.slope + curve.rate * tau));
@@ -243,6 +250,20 @@ class Tracer {
     return false;
   }
 
+  // Whether another margin is negative within a step, also between two nodes.
+  [[nodiscard]] bool Dips(const std::array<PlacedPose, kDegree + 1>& at, int bound) const {
+    Eigen::VectorXd margin(kDegree + 1);
+    for (Eigen::Index j = 0; j < at[0].pose.margin.size(); ++j) {
+      const bool smooth =
+          space_.bounds()[static_cast<size_t>(j)].kind != SetBound::Kind::kConstraint;
+      if (j == bound || !smooth) continue;
+      for (size_t k = 0; k <= kDegree; ++k) {
+        margin[static_cast<Eigen::Index>(k)] = at.at(k).pose.margin[j];
+      }
+      if ((Nodes().dense * margin).minCoeff() < -kDip) return true;
+    }
+    return false;
+  }
   // Along the bound's curve, as `before` goes.
   [[nodiscard]] VecX DirectionAt(const PlacedPose& at, int bound, const VecX& before) const {
     const VecX t = Turned(space_.Slope(at, bound).normalized());
@@ -358,7 +379,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   double s0 = slope.norm(), rate = 0.0;
   loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
   enum class Event { kNone, kCorner, kCloses, kCrossing };
-  for (int step = 0; step < kMostSteps; ++step) {
+  int idle = 0;  // corners at the same point
+  for (int step = 0; step < kMostCurveSteps; ++step) {
     const Curve curve{&here.at, here.bound, t, n, s0, rate};
     const bool singular = IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
     std::array<PlacedPose, kDegree + 1> at;
@@ -454,6 +476,10 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
           (x * nodes.last.transpose()).cwiseAbs() + (x * nodes.one_before.transpose()).cwiseAbs();
       failed = tail.maxCoeff() > kTail * size && h > kLeastStep;
       if (failed) why = "it curves too much";
+      if (!failed && Dips(at, here.bound)) {
+        failed = true;
+        why = "another bound is touched";
+      }
       if (!failed) {
         const Vec2 span = x.rowwise().maxCoeff() - x.rowwise().minCoeff();
         // From the start: less rounding.
@@ -476,6 +502,12 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
         return loop;
       }
       continue;
+    }
+    idle = h < 1e-13 ? idle + 1 : 0;
+    if (idle > static_cast<int>(space_.bounds().size())) {
+      trouble_ = fmt::format("the boundary turns round at {:.6g}, {:.6g}", here.at.pose.at[0],
+                             here.at.pose.at[1]);
+      return loop;
     }
     const VecX carried = here.at.N_free * t;
     VecX along = carried;  // at the last node before a crossing
@@ -515,7 +547,12 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   const double unit = space_.UnitOf(0) * space_.UnitOf(1);
   loop.area = left * area * unit;
   loop.error = error * unit;
-  if (!loop.closed && open == 0 && trouble_.empty()) trouble_ = "a boundary does not close";
+  if (!loop.closed && open == 0 && trouble_.empty()) {
+    trouble_ = fmt::format(
+        "the boundary from {:.6g}, {:.6g} on does not come back: singular curves "
+        "that cross, or nearly so",
+        start.at.pose.at[0], start.at.pose.at[1]);
+  }
   return loop;
 }
 
@@ -742,13 +779,13 @@ class SolidTracer {
       set.summary.message = Trouble();
       return set;
     }
-    (void)Rule(set.low, set.high);
+    (void)Rule({set.low, set.high});
     // Sections anew where an end has moved; a tip more changes them little.
     double low = set.low, high = set.high;
     for (int i = 0; Widen(&set); ++i) {
       Report(kEndsShare * (1.0 - 0.5 / (i + 1)));
       if (std::max(low - set.low, set.high - high) < kMoved * (set.high - set.low)) break;
-      Prepare({{set.low, set.high}});
+      PrepareNodes({Part{set.low, set.high}});
       low = set.low;
       high = set.high;
     }
@@ -769,6 +806,26 @@ class SolidTracer {
   [[nodiscard]] bool unbounded() const { return solid_.unbounded() || unbounded_; }
 
  private:
+  // Gauss–Kronrod 7, 15, its error as QUADPACK has it [Piessens et al. 1983].
+  using Kronrod = boost::math::quadrature::gauss_kronrod<double, 15>;
+  // Of the heights. Where an arc begins or ends, the area has a root of the height: nodes by the
+  // square of a variable from such an end, or 3u² − 2u³ between two.
+  struct Part {
+    double a = kNan, b = kNan;
+    bool ends_a = false, ends_b = false;
+    double value = kNan, error = kNan;
+
+    [[nodiscard]] double length() const { return b - a; }
+    // A height and its rate by the rule's variable, −1 … 1.
+    [[nodiscard]] std::pair<double, double> NodeOf(size_t k, double sign) const {
+      const double u = 0.5 * (1.0 + sign * Kronrod::abscissa()[k]), v = 1.0 - u;
+      if (ends_a && ends_b) return {a + length() * u * u * (1.0 + 2.0 * v), 3 * length() * u * v};
+      if (ends_a) return {a + length() * u * u, length() * u};
+      if (ends_b) return {b - length() * v * v, length() * v};
+      return {a + length() * u, 0.5 * length()};
+    }
+  };
+
   void Report(double fraction) const {
     if (progress_) progress_(fraction);
   }
@@ -945,22 +1002,28 @@ class SolidTracer {
   }
 
   double AreaAt(double height) {
+    if (!lost_.empty()) return 0.0;
     if (!sections_.contains(height)) {
       Keep(log_.Get<Found>([&] { return TraceAt(height); }));
     }
     return sections_.at(height).area;
   }
-  // All of the nodes between these ends at once, from what is known before.
-  void Prepare(const std::vector<std::pair<double, double>>& ends) {
+  // All of the nodes of these parts at once.
+  void PrepareNodes(const std::vector<Part>& parts) {
     std::vector<double> heights;
-    for (const auto& [a, b] : ends) {
+    for (const Part& part : parts) {
       for (size_t k = 0; k < Kronrod::abscissa().size(); ++k) {
         for (const double sign : {-1.0, 1.0}) {
           if (k == 0 && sign > 0.0) continue;
-          heights.push_back(NodeOf(a, b, k, sign));
+          heights.push_back(part.NodeOf(k, sign).first);
         }
       }
     }
+    Prepare(heights);
+  }
+  // Sections at once, from what is known before.
+  void Prepare(const std::vector<double>& heights) {
+    if (!lost_.empty()) return;
     auto found = log_.Get<std::vector<Found>>([&] {
       std::vector<Found> traced(heights.size());
       std::atomic<size_t> next = 0;
@@ -976,17 +1039,8 @@ class SolidTracer {
     for (Found& one : found) Keep(std::move(one));
   }
 
-  // Gauss–Kronrod 7, 15, its error as QUADPACK has it [Piessens et al. 1983].
-  using Kronrod = boost::math::quadrature::gauss_kronrod<double, 15>;
-  [[nodiscard]] static double NodeOf(double a, double b, size_t k, double sign) {
-    return 0.5 * (a + b) + sign * 0.5 * (b - a) * Kronrod::abscissa()[k];
-  }
-  struct Part {
-    double a, b, value, error;
-  };
-  Part Rule(double a, double b) {
+  Part Rule(Part part) {
     using Gauss = boost::math::quadrature::gauss<double, 7>;
-    const double half = 0.5 * (b - a);
     double kronrod = 0.0, gauss = 0.0, spread = 0.0;
     std::vector<std::pair<double, double>> values;
     // From the middle on; every other node is Gauss's.
@@ -994,7 +1048,8 @@ class SolidTracer {
       const double weight = Kronrod::weights()[k];
       for (const double sign : {-1.0, 1.0}) {
         if (k == 0 && sign > 0.0) continue;
-        const double y = AreaAt(NodeOf(a, b, k, sign));
+        const auto [height, rate] = part.NodeOf(k, sign);
+        const double y = AreaAt(height) * rate;
         values.emplace_back(weight, y);
         kronrod += weight * y;
         if (k % 2 == 0) gauss += Gauss::weights()[k / 2] * y;
@@ -1002,13 +1057,72 @@ class SolidTracer {
     }
     for (const auto& [weight, y] : values) spread += weight * std::abs(y - 0.5 * kronrod);
     double error = std::abs(kronrod - gauss);
-    if (spread > 0.0) error = spread * std::min(1.0, std::pow(200.0 * error / spread, 1.5));
-    return {a, b, half * kronrod, half * error};
+    if (spread > 0.0 && !GapOf(part))
+      error = spread * std::min(1.0, std::pow(200.0 * error / spread, 1.5));
+    part.value = kronrod;
+    part.error = error;
+    return part;
+  }
+
+  // Which bounds follow each other around a section.
+  [[nodiscard]] static std::vector<std::pair<int, int>> CornersOf(const TracedSection& section) {
+    std::vector<std::pair<int, int>> corners;
+    for (const TracedLoop& loop : section.loops) {
+      corners.emplace_back(-2, -2);
+      for (size_t k = 0; k < loop.arcs.size(); ++k) {
+        const int a = loop.arcs[k].bound, b = loop.arcs[(k + 1) % loop.arcs.size()].bound;
+        if (a != b) corners.emplace_back(std::min(a, b), std::max(a, b));
+      }
+    }
+    std::ranges::sort(corners);
+    return corners;
+  }
+  // The widest gap of a part's sections where they have other corners from one height on.
+  [[nodiscard]] std::optional<std::pair<double, double>> GapOf(const Part& part) const {
+    std::optional<std::pair<double, double>> widest;
+    for (auto below = sections_.lower_bound(part.a); below != sections_.end(); ++below) {
+      const auto above = std::next(below);
+      if (above == sections_.end() || above->first > part.b) break;
+      const double low = below->first, high = above->first, middle = 0.5 * (low + high);
+      if (std::min(middle - part.a, part.b - middle) < kSliver * part.length() ||
+          (widest && high - low <= widest->second - widest->first) ||
+          CornersOf(below->second) == CornersOf(above->second)) {
+        continue;
+      }
+      widest = {low, high};
+    }
+    return widest;
+  }
+  // Halves of a part, or two parts where its sections change.
+  std::pair<Part, Part> Split(const Part& part) {
+    auto gap = GapOf(part);
+    if (!gap) {
+      const double middle = 0.5 * (part.a + part.b);
+      return {{part.a, middle, part.ends_a, false}, {middle, part.b, false, part.ends_b}};
+    }
+    while (gap->second - gap->first > 0.1 * kSliver * part.length()) {
+      const auto [low, high] = *gap;
+      const std::vector<double> heights = {0.75 * low + 0.25 * high, 0.5 * (low + high),
+                                           0.25 * low + 0.75 * high};
+      Prepare(heights);
+      if (!lost_.empty()) break;
+      const auto from = CornersOf(sections_.at(low));
+      for (const double height : heights) {
+        if (CornersOf(sections_.at(height)) != from) {
+          gap->second = height;
+          break;
+        }
+        gap->first = height;
+      }
+    }
+    const double at = 0.5 * (gap->first + gap->second);
+    return {{part.a, at, part.ends_a, true}, {at, part.b, true, part.ends_b}};
   }
 
   void Integrate(TracedSet* set) {
-    std::vector<Part> parts = {Rule(set->low, set->high)};
-    if (std::exchange(mended_, false)) parts = {Rule(set->low, set->high)};
+    const Part whole{set->low, set->high};
+    std::vector<Part> parts = {Rule(whole)};
+    if (std::exchange(mended_, false)) parts = {Rule(whole)};
     const auto sum = [&](double Part::*member) {
       double total = 0.0;
       for (const Part& part : parts) total += part.*member;
@@ -1022,12 +1136,12 @@ class SolidTracer {
     };
     while (!enough() && sections_.size() < kMostSections && lost_.empty()) {
       const auto worst = std::ranges::max_element(parts, {}, &Part::error);
-      const double a = worst->a, b = worst->b, middle = 0.5 * (a + b);
-      Prepare({{a, middle}, {middle, b}});
-      *worst = Rule(a, middle);
-      parts.push_back(Rule(middle, b));
+      const auto [lower, upper] = Split(*worst);
+      PrepareNodes({lower, upper});
+      *worst = Rule(lower);
+      parts.push_back(Rule(upper));
       if (std::exchange(mended_, false)) {
-        for (Part& part : parts) part = Rule(part.a, part.b);
+        for (Part& part : parts) part = Rule(part);
       }
       if (progress_ && start > 0.0) {
         const double done = std::log(start / std::max(sum(&Part::error), 1e-300)) /

@@ -359,6 +359,32 @@ class Commands(unittest.TestCase):
         with self.assertRaises(mbverify.InputError):
             mbverify.workspace("four_bar", ["x", "qq"])
 
+    def test_the_best_design_is_the_programs(self):
+        result = mbverify.best_design(
+            "friction_five_bar",
+            ["x", "y"],
+            {"upper_mm": (230, 260)},
+            evaluations=16,
+            resolution=60,
+            jobs=2,
+        )
+        self.assertTrue(result.agrees)
+        value, error = result.measure
+        traced = np.array(result.designs["way"]) == "boundary"
+        areas = result.designs["measure"][traced]
+        self.assertAlmostEqual(areas.max(), value, delta=1e-6 * value)
+        upper = result.parameters["upper"]
+        self.assertTrue(0.23 <= upper <= 0.26)
+        # The set of this design, and of one beside it.
+        own = mbverify.workspace("friction_five_bar", ["x", "y"], set=result.parameters, resolution=60)
+        self.assertAlmostEqual(own.measure[0], value, delta=1e-6 * value)
+        beside = mbverify.workspace(
+            "friction_five_bar", ["x", "y"], set={"upper": upper - 0.005}, resolution=60
+        )
+        self.assertLess(beside.measure[0], value - error)
+        with self.assertRaises(mbverify.InputError):
+            mbverify.best_design("friction_five_bar", ["x", "y"], {"uper": (0.2, 0.3)})
+
     def test_a_workspaces_surface_is_closed(self):
         result = mbverify.workspace(
             "spr_tripod",

@@ -6,8 +6,8 @@
     solver = mbverify.load("stewart").solver()        # the solver object, in the drives
     forces = solver.inverse_dynamics(solver.home)     # of this state
 
-SI units and radians. `run`, `audit`, `study`, `workspace`, `linearise` and `figures` start the
-program: their results are its files, and a file that ends the program ends no interpreter.
+SI units and radians. `run`, `audit`, `study`, `workspace`, `best_design`, `linearise` and `figures`
+start the program: their results are its files, and a file that ends the program ends no interpreter.
 """
 
 from ._native import (
@@ -27,12 +27,14 @@ from ._native import (
     load,
 )
 from ._program import (
+    BestDesign,
     Linearisation,
     ProgramError,
     Result,
     StudyResult,
     WorkspaceResult,
     audit,
+    best_design,
     figures,
     linearise,
     program,
@@ -42,6 +44,7 @@ from ._program import (
 )
 
 __all__ = [
+    "BestDesign",
     "ConvergenceError",
     "Finding",
     "Forces",
@@ -61,6 +64,7 @@ __all__ = [
     "WorkspaceResult",
     "Wrench",
     "audit",
+    "best_design",
     "figures",
     "linearise",
     "load",

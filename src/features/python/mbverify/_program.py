@@ -318,18 +318,63 @@ class WorkspaceResult(_Result):
         return f"<mbverify.WorkspaceResult {value:.6g} ± {error:.1g} {self.summary['set']['unit']}: {how}>"
 
 
-def _columns(file):
-    """A CSV file's columns by name: numbers as arrays, NaN where empty, else strings."""
+def _columns(file, text=("bound", "kind")):
+    """A CSV file's columns by name: those of `text` as strings, else numbers, NaN where empty."""
     with open(file, encoding="utf-8", newline="") as stream:
         rows = list(csv.reader(stream))
     columns = {}
     for k, name in enumerate(rows[0]):
         values = [row[k] for row in rows[1:]]
-        if name in ("bound", "kind"):
+        if name in text:
             columns[name] = values
         else:
             columns[name] = numpy.array([float(value or "nan") for value in values])
     return columns
+
+
+def _workspace(model, folder, over, values, more, progress):
+    """The document and text of `mbverify workspace` for the arguments of workspace()."""
+    options = []
+    boxes = over if isinstance(over, dict) else {name: None for name in over}
+    cones = {
+        f"{joint}_deg": numpy.degrees(angle) for joint, angle in (values["cones"] or {}).items()
+    }
+    for option, named in (
+        ("--over", boxes),
+        ("--at", values["at"]),
+        ("--from", values["start"]),
+        ("--range", values["ranges"]),
+        ("--for-all", values["for_all"]),
+        ("--for-some", values["for_some"]),
+        ("--cone", cones),
+    ):
+        for name, value in (named or {}).items():
+            if value is not None:
+                ends = value if isinstance(value, (tuple, list)) else (value,)
+                name += "=" + ":".join(repr(float(end)) for end in ends)
+            options += [option, name]
+    for option, value in (
+        ("--output", values["output"]),
+        ("--resolution", values["resolution"]),
+        ("--jobs", values["jobs"]),
+    ):
+        if value is not None:
+            options += [option, value]
+    if values["cross_singularities"]:
+        options.append("--cross-singularities")
+    document, _, text = _call(
+        "workspace",
+        model,
+        *options,
+        *more,
+        *_set(values["set"]),
+        "--no-pictures",
+        "--out",
+        folder.path,
+        allowed=(0, 1),
+        progress=progress,
+    )
+    return document, folder.path / document["mechanism"] / "workspace", text
 
 
 def workspace(
@@ -356,41 +401,82 @@ def workspace(
     {name: value}. `ranges`, `for_all` and `for_some`: {name: (low, high)}; `cones`: {joint: angle}
     [rad]. Names may end in _mm or _deg. Raises InputError for bad input.
     """
+    values = dict(locals())
     folder = _Folder(out)
-    options = []
-    boxes = over if isinstance(over, dict) else {name: None for name in over}
-    for option, values in (
-        ("--over", boxes),
-        ("--at", at),
-        ("--from", start),
-        ("--range", ranges),
-        ("--for-all", for_all),
-        ("--for-some", for_some),
-        ("--cone", {f"{joint}_deg": numpy.degrees(angle) for joint, angle in (cones or {}).items()}),
-    ):
-        for name, value in (values or {}).items():
-            if value is not None:
-                ends = value if isinstance(value, (tuple, list)) else (value,)
-                name += "=" + ":".join(repr(float(end)) for end in ends)
-            options += [option, name]
-    for option, value in (("--output", output), ("--resolution", resolution), ("--jobs", jobs)):
-        if value is not None:
-            options += [option, value]
-    if cross_singularities:
-        options.append("--cross-singularities")
-    document, _, text = _call(
-        "workspace",
-        model,
-        *options,
-        *_set(set),
-        "--no-pictures",
-        "--out",
-        folder.path,
-        allowed=(0, 1),
-        progress=progress,
-    )
-    place = folder.path / document["mechanism"] / "workspace"
+    document, place, text = _workspace(model, folder, over, values, (), progress)
     return WorkspaceResult(document, place, folder, text)
+
+
+class BestDesign(_Result):
+    """What `mbverify workspace --maximise volume` says: `summary` is its JSON, `folder` has its
+    files. SI units and radians."""
+
+    @property
+    def agrees(self):
+        """Whether the lattice measures the best design's set as its boundary does, and no design
+        that it looked at is larger."""
+        return self.summary["agree"]
+
+    @property
+    def parameters(self):
+        """{name: value} of the best design, as workspace(…, set=…) takes them."""
+        return {p["name"]: p["best"] for p in self.summary["best_design"]["parameters"]}
+
+    @property
+    def measure(self):
+        """The best design's length or area by its boundary, and its error."""
+        traced = self.summary["best_design"]["traced"]
+        return traced["value"], traced["error"]
+
+    @property
+    def designs(self):
+        """Columns of designs.csv, one row per design that was measured."""
+        return _columns(self.folder / "designs.csv", ("way", "why_none"))
+
+    def __repr__(self):
+        how = "agree" if self.agrees else "disagree"
+        return f"<mbverify.BestDesign of {self.summary['mechanism']}: {how}>"
+
+
+def best_design(
+    model,
+    over,
+    parameters,
+    *,
+    local=False,
+    evaluations=None,
+    seed=None,
+    at=None,
+    start=None,
+    ranges=None,
+    for_all=None,
+    for_some=None,
+    cones=None,
+    output=None,
+    resolution=None,
+    cross_singularities=False,
+    set=None,
+    jobs=None,
+    out=None,
+    progress=False,
+):
+    """The design whose set over one or two coordinates is largest; its BestDesign.
+
+    `parameters`: {name: (low, high)} of the model, whose names may end in _mm or _deg; `local`
+    searches from the model's own values alone. All others as of workspace().
+    """
+    values = dict(locals())
+    folder = _Folder(out)
+    more = ["--maximise", "volume"]
+    for name, (low, high) in parameters.items():
+        more += ["--over-parameters", f"{name}={float(low)!r}:{float(high)!r}"]
+    if local:
+        more.append("--local")
+    for option, value in (("--evaluations", evaluations), ("--seed", seed)):
+        if value is not None:
+            more += [option, value]
+    document, place, text = _workspace(model, folder, over, values, more, progress)
+    return BestDesign(document, place, folder, text)
 
 
 class Linearisation(_Result):
