@@ -273,7 +273,10 @@ const std::vector<BenchmarkEngine>& BenchmarkEngines() {
        .command = "mbverify-witness-mujoco"},
       {.name = "mujoco_newest_default",
        .about = "the newest MuJoCo with its default settings",
-       .command = "mbverify-witness-mujoco --defaults"}};
+       .command = "mbverify-witness-mujoco --defaults"},
+      {.name = "mujoco_newest_inverse",
+       .about = "the newest MuJoCo's inverse dynamics",
+       .command = "mbverify-witness-mujoco --inverse"}};
   return engines;
 }
 
