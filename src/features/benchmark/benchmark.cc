@@ -57,30 +57,27 @@ Eigen::Index RowAt(const Trace& trace, double time_s) {
   return next - trace.time_s.begin();
 }
 
-// By instant; NaN where the trace has none.
-std::vector<double> ValuesAt(const PublishedSeries& series, const Trace& trace) {
-  std::vector<double> values(series.time_s.size(), kNan);
+// Computed less published, by instant; NaN where the trace has none. Angles of a pose are the same
+// after a turn; those of drives count their turns.
+std::vector<double> DifferencesOf(const PublishedSeries& series, const Trace& trace) {
+  std::vector<double> differences(series.time_s.size(), kNan);
   const int column = trace.Find(series.channel);
-  for (size_t k = 0; k < values.size() && column >= 0; ++k) {
+  if (column < 0) return differences;
+  const Channel& channel = trace.channels[static_cast<size_t>(column)];
+  const bool angle = channel.quantity == Quantity::kPose && channel.component >= 3;
+  for (size_t k = 0; k < differences.size(); ++k) {
     const Eigen::Index row = RowAt(trace, series.time_s[k]);
-    if (row >= 0) values[k] = trace.values(row, column);
+    if (row < 0) continue;
+    const double value = trace.values(row, column);
+    differences[k] = angle ? AngleDifference(value, series.values[k]) : value - series.values[k];
   }
-  return values;
+  return differences;
 }
 
-// Angles of a pose are the same after a turn; those of drives count their turns.
-bool IsPoseAngle(const std::string& channel, const Trace& trace) {
-  const int column = trace.Find(channel);
-  if (column < 0) return false;
-  const Channel& found = trace.channels[static_cast<size_t>(column)];
-  return found.quantity == Quantity::kPose && found.component >= 3;
-}
-
-SeriesError ErrorOf(const PublishedSeries& series, const std::vector<double>& values, bool angle) {
+SeriesError ErrorOf(const PublishedSeries& series, const std::vector<double>& differences) {
   SeriesError error{.largest = 0.0};
-  for (size_t k = 0; k < values.size(); ++k) {
-    const double difference = std::abs(angle ? AngleDifference(values[k], series.values[k])
-                                             : values[k] - series.values[k]);
+  for (size_t k = 0; k < differences.size(); ++k) {
+    const double difference = std::abs(differences[k]);
     if (std::isnan(difference)) return {};
     error.largest = std::max(error.largest, difference);
     const double ratio = difference / series.uncertainty[k];
@@ -183,7 +180,7 @@ class CaseRun {
     const Trace* truth =
         reference != nullptr && reference->summary.ok() ? &reference->trace : nullptr;
     const double length = CharacteristicLength(prepared_.base);
-    // By series: what the judging engines computed.
+    // By series: the differences of the judging engines.
     std::vector<std::vector<std::vector<double>>> judged(benchmark_.published.size());
     for (const Computed& computed : all) {
       EngineOnCase& row = result->engines.emplace_back();
@@ -195,10 +192,10 @@ class CaseRun {
       const Trace& trace = *computed.trace;
       for (size_t k = 0; k < benchmark_.published.size(); ++k) {
         const PublishedSeries& series = benchmark_.published[k];
-        std::vector<double> values = ValuesAt(series, trace);
-        row.series.push_back(ErrorOf(series, values, IsPoseAngle(series.channel, trace)));
+        std::vector<double> differences = DifferencesOf(series, trace);
+        row.series.push_back(ErrorOf(series, differences));
         if (Judges(row.engine) && std::isfinite(row.series.back().largest)) {
-          judged[k].push_back(std::move(values));
+          judged[k].push_back(std::move(differences));
         }
       }
       const WitnessMetrics own = MeasureWitness(input, trace);
@@ -222,9 +219,9 @@ class CaseRun {
       double largest = judged[s].size() < 2 ? kNan : 0.0;
       for (size_t k = 0; k < benchmark.published[s].values.size() && judged[s].size() > 1; ++k) {
         double low = judged[s].front()[k], high = low;
-        for (const std::vector<double>& values : judged[s]) {
-          low = std::min(low, values[k]);
-          high = std::max(high, values[k]);
+        for (const std::vector<double>& differences : judged[s]) {
+          low = std::min(low, differences[k]);
+          high = std::max(high, differences[k]);
         }
         largest = std::max(largest, (high - low) / benchmark.published[s].uncertainty[k]);
       }
@@ -339,13 +336,18 @@ void Judge(const BenchmarkCase& benchmark, const std::vector<double>& spread,
     if (!outside.empty()) outside += ", ";
     outside += fmt::format("{} ({:.3g} times its uncertainty)", series.called, least);
   }
+  std::string without;
+  for (const EngineOnCase& engine : result->engines) {
+    const bool missing = !engine.ran() && IsJudging(engine.engine) && engine.engine != kClosedForm;
+    if (missing) without += "; without " + engine.engine + ": " + engine.why;
+  }
   if (outside.empty()) {
     return end(CaseVerdict::kConfirmed,
-               fmt::format("all of {} within their uncertainty, at most {:.2g} of it",
-                           benchmark.published.size(), worst));
+               fmt::format("all of {} within their uncertainty, at most {:.2g} of it{}",
+                           benchmark.published.size(), worst, without));
   }
   end(CaseVerdict::kContradicted,
-      "the judging engines agree with each other and not with " + outside);
+      "the judging engines agree with each other and not with " + outside + without);
 }
 
 bool AsStated(const BenchmarkCase& benchmark, const BenchmarkResult& result) {
@@ -373,6 +375,10 @@ BenchmarkResult RunBenchmarkCase(const BenchmarkCase& benchmark,
   std::optional<Prepared> prepared = Prepare(benchmark.scenario, options, &diagnostics);
   if (!prepared) {
     result.reason = FirstError(diagnostics);
+    return result;
+  }
+  if (prepared->has_table()) {
+    result.reason = "the scenario has a table in the reference's place";
     return result;
   }
   prepared->scenario.simulation.step_s *= step_factor;

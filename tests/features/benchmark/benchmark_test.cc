@@ -118,6 +118,15 @@ TEST_F(BenchmarkTest, ASignalThatIsNotRecordedIsNotRun) {
   EXPECT_THAT(result.reason, HasSubstr("0 of two judging engines recorded absent.position"));
 }
 
+TEST_F(BenchmarkTest, ATableIsNoEngine) {
+  Copy("damped_pendulum");
+  Write("table.csv", "time_s,pin.position\n0,0\n0.5,0\n1,0\n1.5,0\n2,0\n");
+  Replace("run.yaml", "analytic: none", "reference: {csv: table.csv}\nanalytic: none");
+  const BenchmarkResult result = Run();
+  EXPECT_EQ(result.verdict, CaseVerdict::kNotRun);
+  EXPECT_THAT(result.reason, HasSubstr("table"));
+}
+
 TEST_F(BenchmarkTest, AnInstantBetweenSamplesIsNotRun) {
   Copy("damped_pendulum");
   Replace("published.csv", "\n0.1,", "\n0.1001,");
@@ -157,8 +166,9 @@ TEST_F(BenchmarkTest, ReportsAllFindingsOfACase) {
               HasSubstr("scenario: the case is not_expressible"));
 }
 
-// Errors of two judging engines against one published value of uncertainty 1.
-CaseVerdict VerdictOf(double a, double b, double spread) {
+// One published value of uncertainty 1, and engines' errors against it; NaN: not recorded.
+BenchmarkResult Judged(const std::vector<std::pair<std::string, double>>& errors, double spread,
+                       const std::string& failed = "") {
   PublishedSeries series;
   series.channel = series.called = "c";
   series.time_s = {0.0};
@@ -167,16 +177,29 @@ CaseVerdict VerdictOf(double a, double b, double spread) {
   BenchmarkCase benchmark;
   benchmark.published = {series};
   BenchmarkResult result;
-  const auto add = [&](const std::string& engine, double error) {
+  for (const auto& [engine, error] : errors) {
     EngineOnCase& row = result.engines.emplace_back();
     row.engine = engine;
     row.series = {{.largest = error, .time_s = 0.0, .ratio = error}};
-  };
-  add("reference", a);
-  add("simulation", b);
-  add("simbody", 100.0);
+  }
+  if (!failed.empty()) {
+    EngineOnCase& row = result.engines.emplace_back();
+    row.engine = failed;
+    row.why = "diverged";
+  }
   Judge(benchmark, {spread}, &result);
-  return result.verdict;
+  return result;
+}
+CaseVerdict VerdictOf(double a, double b, double spread) {
+  return Judged({{"reference", a}, {"simulation", b}, {"simbody", 100.0}}, spread).verdict;
+}
+
+TEST(BenchmarkVerdict, SaysWhichJudgingEngineIsMissing) {
+  const std::vector<std::pair<std::string, double>> two = {{"closed_form", 0.1},
+                                                           {"reference", 0.2}};
+  EXPECT_THAT(Judged(two, 0.1).reason, testing::Not(HasSubstr("without")));
+  EXPECT_THAT(Judged(two, 0.1, "simulation").reason, HasSubstr("without simulation: diverged"));
+  EXPECT_THAT(Judged(two, 0.1, "simbody").reason, testing::Not(HasSubstr("without")));
 }
 
 TEST(BenchmarkVerdict, FollowsTheJudgingEngines) {
