@@ -168,6 +168,11 @@ class CaseReader {
   void ReadColumn(const YamlMap& map, PublishedSeries* series) {
     const std::string name = RequiredText(map, "table"), column = RequiredText(map, "column");
     if (name.empty() || column.empty()) return;
+    if (fs::path(name).has_parent_path()) {
+      yaml_.Error(*map.Find("table"), fmt::format("{}: the table is '{}'", map.path(), name),
+                  "it lies beside the case: a file name without folders");
+      return;
+    }
     const std::string file = (fs::path(yaml_.file()).parent_path() / name).string();
     if (file != table_file_) {
       table_file_ = file;

@@ -153,6 +153,8 @@ TEST_F(BenchmarkTest, ReportsAllFindingsOfACase) {
   EXPECT_THAT(one("channel: c, value: 1, at_s: 0, uncertainty: 0.1"), HasSubstr("why"));
   EXPECT_THAT(one("channel: c, why: w, table: none.csv, column: a, relative: 0.01"),
               HasSubstr("none.csv"));
+  EXPECT_THAT(one("channel: c, why: w, table: ../secret.csv, column: a, relative: 0.01"),
+              HasSubstr("it lies beside the case"));
   Write("words.csv", "time_s,a\n0,1\n0.1,one\n");
   EXPECT_THAT(one("channel: c, why: w, table: words.csv, column: a, relative: 0.01"),
               HasSubstr("words.csv:3:5: error: column 'a' has no number here"));
