@@ -180,6 +180,7 @@ class CaseRun {
     const Trace* truth =
         reference != nullptr && reference->summary.ok() ? &reference->trace : nullptr;
     const double length = CharacteristicLength(prepared_.base);
+    const bool loops = std::ranges::any_of(prepared_.base.joints, &Joint::closure);
     // By series: the differences of the judging engines.
     std::vector<std::vector<std::vector<double>>> judged(benchmark_.published.size());
     for (const Computed& computed : all) {
@@ -199,7 +200,7 @@ class CaseRun {
         }
       }
       const WitnessMetrics own = MeasureWitness(input, trace);
-      row.closure_m = ValueOf(own.metrics, Metric::kClosureM);
+      if (loops) row.closure_m = ValueOf(own.metrics, Metric::kClosureM);
       row.energy = ValueOf(own.metrics, Metric::kEnergy);
       if (truth == nullptr || &trace == truth) continue;
       const PairComparison pair = ComparePair(input, trace, *truth);

@@ -76,7 +76,7 @@ struct EngineOnCase {
   double motion = kNan;     ///< largest error of drives and outputs [rad, characteristic lengths]
   double force = kNan;      ///< all drive forces, RMS error over RMS
   double reaction = kNan;   ///< all unique joint reactions, RMS error over RMS
-  double closure_m = kNan;  ///< largest loop gap
+  double closure_m = kNan;  ///< largest loop gap; NaN of a tree
   double energy = kNan;     ///< largest drift over the energy turned over
   double cpu_s = kNan;      ///< processor time of the computation, without start-up
 

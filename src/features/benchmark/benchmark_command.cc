@@ -1,6 +1,7 @@
 // `mbverify benchmark` as a user types it.
 #include <fmt/format.h>
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,7 +32,7 @@ struct BenchmarkArguments {
 // Those given, by path or as scenarios are named; else the shipped ones.
 std::vector<std::string> PathsOf(const std::vector<std::string>& given) {
   std::vector<std::string> paths;
-  for (const std::string& path : given) paths.push_back(FindScenario(path));
+  std::ranges::transform(given, std::back_inserter(paths), FindScenario);
   if (paths.empty()) paths.push_back(FindScenario("benchmark"));
   return paths;
 }

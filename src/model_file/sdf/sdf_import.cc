@@ -10,7 +10,6 @@
 #include <map>
 #include <memory>
 #include <numeric>
-#include <ranges>
 #include <sdf/sdf.hh>
 #include <set>
 #include <sstream>
@@ -892,9 +891,9 @@ ForeignModel AnswerOf(const SdfSource& source) {
   config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::LOG);
   config.SetDeprecatedElementsPolicy(sdf::EnforcementPolicy::LOG);
   // The innermost come last.
-  for (const SdfSource::Include& include : std::views::reverse(source.includes)) {
-    const std::string trouble = WriteCopy(source, include, config);
-    if (!trouble.empty()) found.AddError(include.file, trouble);
+  for (auto include = source.includes.rbegin(); include != source.includes.rend(); ++include) {
+    const std::string trouble = WriteCopy(source, *include, config);
+    if (!trouble.empty()) found.AddError(include->file, trouble);
   }
   sdf::Root root;
   if (!found.has_errors()) AddErrors(root.LoadSdfString(source.text, config), source, &found);
