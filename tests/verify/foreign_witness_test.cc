@@ -427,7 +427,7 @@ TEST(ForeignWitness, SimbodyMovesFreely) {
       << heavy.report->comparison.driving;
 }
 
-// What it does not know it declines, and the verdict is that of the others.
+// What it does not know is not applicable, and the verdict is that of the others.
 TEST(ForeignWitness, SimbodyDeclinesFriction) {
   RunOptions options;
   options.pictures = false;

@@ -88,7 +88,7 @@ struct JudgedForces {
   double dual_limit = kNan, difference_limit = kNan;
 
   [[nodiscard]] bool agrees() const {
-    return dual_error <= dual_limit && !(difference_error > difference_limit);
+    return dual_error <= dual_limit && difference_error <= difference_limit;
   }
   /// Channels of reactions that redundant constraints leave open.
   [[nodiscard]] std::vector<std::string> NotUnique(const Mechanism& mechanism) const;

@@ -974,7 +974,7 @@ class SolidTracer {
           other->second = std::move(more.section);
           seeds_[other->first] = std::move(more.inside);
           changed.push_back(other->first);
-          mended_ = true;
+          completed_ = true;
         }
         closings_ += more.closings;
       }
@@ -1122,7 +1122,7 @@ class SolidTracer {
   void Integrate(TracedSet* set) {
     const Part whole{set->low, set->high};
     std::vector<Part> parts = {Rule(whole)};
-    if (std::exchange(mended_, false)) parts = {Rule(whole)};
+    if (std::exchange(completed_, false)) parts = {Rule(whole)};
     const auto sum = [&](double Part::*member) {
       double total = 0.0;
       for (const Part& part : parts) total += part.*member;
@@ -1140,7 +1140,7 @@ class SolidTracer {
       PrepareNodes({lower, upper});
       *worst = Rule(lower);
       parts.push_back(Rule(upper));
-      if (std::exchange(mended_, false)) {
+      if (std::exchange(completed_, false)) {
         for (Part& part : parts) part = Rule(part);
       }
       if (progress_ && start > 0.0) {
@@ -1168,7 +1168,7 @@ class SolidTracer {
   std::map<double, TracedSection> sections_;
   std::string lost_;
   long closings_ = 0;
-  bool mended_ = false, unbounded_ = false;
+  bool completed_ = false, unbounded_ = false;
 };
 
 }  // namespace
