@@ -406,7 +406,7 @@ class Checker {
     }
     for (const ForceElement& element : mechanism_.elements) {
       Add(fmt::format("element {}, {}", element.name, Described(mechanism_, element)),
-          "has no damping, springs, rotors and friction of joints");
+          "has no damping, springs, rotors, friction, stops and curves");
     }
     for (const Drive& drive : mechanism_.drives) {
       if (Find(coverage_.drives, drive.name) != nullptr) continue;

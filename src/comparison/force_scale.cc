@@ -437,6 +437,20 @@ double SizeOf(const SpringLaw& law, const Rates& rates, const MotionSize& motion
   const double by_energy = std::sqrt(2.0 * k * std::max(0.0, motion.most_energy_J));
   return std::max(std::abs(at_home), std::min(by_energy, k * rates.velocity * motion.duration_s));
 }
+// What it stops: the energy of the motion before it, as of a spring.
+double SizeOf(const StopLaw& law, const Rates& rates, const MotionSize& motion) {
+  const double deepest = std::max({0.0, rates.home - law.upper, law.lower - rates.home});
+  const double stored = std::max(0.0, motion.most_energy_J) * (law.exponent + 1.0) / law.stiffness;
+  const double by_energy =
+      law.stiffness * std::pow(stored, law.exponent / (law.exponent + 1.0));
+  return std::max(law.stiffness * std::pow(deepest, law.exponent), by_energy);
+}
+// Within its knots.
+double SizeOf(const CurveLaw& law, const Rates& /*rates*/, const MotionSize& /*motion*/) {
+  double largest = 0.0;
+  for (const CurveLaw::Knot& knot : law.knots) largest = std::max(largest, std::abs(knot.force));
+  return largest;
+}
 double SizeOf(const RotorLaw& law, const Rates& rates, const MotionSize& /*motion*/) {
   return law.reflected() * rates.acceleration;
 }

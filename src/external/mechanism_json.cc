@@ -178,6 +178,9 @@ class Writer {
       json["on"] = {{"bushing", m_.bushings[static_cast<size_t>(element.bushing)].name},
                     {"coordinate", element.coordinate}};
     }
+    if (element.spring >= 0) {
+      json["on"] = {{"spring", m_.springs[static_cast<size_t>(element.spring)].name}};
+    }
     json["law"] = std::visit([this](const auto& law) { return LawJson(law); }, element.law);
     return json;
   }
@@ -194,12 +197,35 @@ class Writer {
     }
     return json;
   }
+  [[nodiscard]] Json LawJson(const StopLaw& law) const {
+    Json json = {{"stiffness", law.stiffness},
+                 {"exponent", law.exponent},
+                 {"damping", law.damping},
+                 {"dissipation", law.dissipation}};
+    if (std::isfinite(law.lower)) json["lower"] = law.lower;
+    if (std::isfinite(law.upper)) json["upper"] = law.upper;
+    return json;
+  }
+  [[nodiscard]] Json LawJson(const CurveLaw& law) const {
+    Json knots = Json::array();
+    for (const CurveLaw::Knot& knot : law.knots) {
+      knots.push_back({{"at", knot.at},
+                       {"force", knot.force},
+                       {"slope_before", knot.slope_before},
+                       {"slope_after", knot.slope_after}});
+    }
+    return {{"of", law.of_rate ? "rate" : "position"}, {"knots", std::move(knots)}};
+  }
   [[nodiscard]] Json LawJson(const FrictionLaw& law) const {
-    return {{"coulomb", law.coulomb},
-            {"breakaway", law.breakaway},
-            {"stribeck_rate", law.stribeck_rate},
-            {"coefficient", law.coefficient},
-            {"radius", law.radius}};
+    Json json = {{"coulomb", law.coulomb},
+                 {"breakaway", law.breakaway},
+                 {"stribeck_rate", law.stribeck_rate},
+                 {"coefficient", law.coefficient},
+                 {"radius", law.radius}};
+    if (std::isfinite(law.length)) json["length"] = law.length;
+    if (law.thrust_radius > 0.0) json["thrust_radius"] = law.thrust_radius;
+    if (law.coupling >= 0) json["coupling"] = m_.couplings[static_cast<size_t>(law.coupling)].name;
+    return json;
   }
 
   const Mechanism& m_;

@@ -119,8 +119,9 @@ ScalarRow JointRowBy(const Joint& joint, int coordinate, const Frames& frames) {
   return ToRow(internal::CoordinateBetween(joint, coordinate, pair), joint.parent, joint.child);
 }
 
-template <typename Frames>
-ScalarRow LegRowBy(const DistanceDrive& leg, const Frames& frames) {
+// Of a distance drive or a spring.
+template <typename Leg, typename Frames>
+ScalarRow LegRowBy(const Leg& leg, const Frames& frames) {
   const auto pair = frames.Between(leg.body_from, At(leg.p_from), leg.body_to, At(leg.p_to));
   return ToRow(Distance(pair), leg.body_from, leg.body_to);
 }
@@ -400,6 +401,9 @@ ScalarRow ElementRow(const Mechanism& mechanism, size_t e, const BodyStates& sta
     return BushingRow(mechanism.bushings[static_cast<size_t>(element.bushing)], element.coordinate,
                       states);
   }
+  if (element.spring >= 0) {
+    return LegRowBy(mechanism.springs[static_cast<size_t>(element.spring)], Here{states});
+  }
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
   if (IsOfBall(joint.kind, element.coordinate)) return BallRow(joint, element.coordinate, states);
   const double near =
@@ -528,6 +532,9 @@ ScalarRow VariedElementRow(const Mechanism& mechanism, size_t e, const BodyState
   if (element.bushing >= 0) {
     return BushingRowBy(mechanism.bushings[static_cast<size_t>(element.bushing)],
                         element.coordinate, Varied{states, by});
+  }
+  if (element.spring >= 0) {
+    return LegRowBy(mechanism.springs[static_cast<size_t>(element.spring)], Varied{states, by});
   }
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
   if (!IsOfBall(joint.kind, element.coordinate)) {

@@ -102,6 +102,9 @@ RampCruiseTimes TimesOf(const RampCruiseTerm& r) {
   return {T_v, S_v, (r.length - S_v) / r.v_max};
 }
 
+// Times of steps and samples are rounded: within this share of a time it is that time.
+constexpr double kSameTime = 1e-12;
+
 struct Evaluator {
   double t;
 
@@ -157,6 +160,10 @@ struct Evaluator {
     return jet;
   }
   Jet operator()(const PiecewiseTerm& p) const { return Evaluate(*p.pieces, t); }
+  Jet operator()(const JumpTerm& j) const {
+    const bool after = t >= j.at_s - kSameTime * std::max(1.0, std::abs(j.at_s));
+    return {after ? j.delta : 0.0, 0.0, 0.0};
+  }
 };
 
 struct BreakFinder {
@@ -186,6 +193,7 @@ struct BreakFinder {
   void operator()(const PiecewiseTerm& p) const {
     times->insert(times->end(), p.pieces->breaks.begin(), p.pieces->breaks.end());
   }
+  void operator()(const JumpTerm& j) const { times->push_back(j.at_s); }
 };
 
 }  // namespace
@@ -198,6 +206,16 @@ std::vector<double> BreakTimes(const Profile& profile) {
   times.erase(std::unique(times.begin(), times.end()), times.end());
   return times;
 }
+
+std::vector<double> JumpTimes(const Profile& profile) {
+  Profile jumps{.terms = {}, .from_s = profile.from_s};
+  for (const ProfileTerm& term : profile.terms) {
+    if (std::holds_alternative<JumpTerm>(term)) jumps.terms.push_back(term);
+  }
+  return BreakTimes(jumps);
+}
+
+double BeforeJump(double t_s) { return t_s - 4.0 * kSameTime * std::max(1.0, std::abs(t_s)); }
 
 Jet Evaluate(const ProfileTerm& term, double t_s) { return std::visit(Evaluator{t_s}, term); }
 

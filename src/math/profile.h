@@ -98,9 +98,14 @@ struct PiecewiseTerm {
   std::shared_ptr<const Piecewise> pieces;
 };
 
+/// 0 before at_s, delta from there on: what is switched, forces only.
+struct JumpTerm {
+  double at_s = 0.0, delta = 0.0;
+};
+
 using ProfileTerm =
     std::variant<ConstantTerm, RampTerm, SineTerm, PolyStepTerm, Poly4567StepTerm, CycloidStepTerm,
-                 BumpTerm, RampCruiseTerm, ModifiedSineTerm, FourierTerm, PiecewiseTerm>;
+                 BumpTerm, RampCruiseTerm, ModifiedSineTerm, FourierTerm, PiecewiseTerm, JumpTerm>;
 
 /// The sum of its terms, which are functions of t + from_s.
 struct Profile {
@@ -117,6 +122,11 @@ struct Profile {
 /// Times at which some derivative of the profile jumps (ascending, without repetition) [s]: an
 /// integrator should step onto them.
 [[nodiscard]] std::vector<double> BreakTimes(const Profile& profile);
+
+/// Times at which its value jumps, ascending, without repetition [s]. There and a round-off before
+/// it has its value after the jump, and at BeforeJump() of such a time the one before.
+[[nodiscard]] std::vector<double> JumpTimes(const Profile& profile);
+[[nodiscard]] double BeforeJump(double t_s);
 
 [[nodiscard]] inline Profile Constant(double value) { return {.terms = {ConstantTerm{value}}}; }
 

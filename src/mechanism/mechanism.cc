@@ -133,13 +133,13 @@ const char* WordOf(Contact::Kind kind) {
 
 const char* WordOf(const ForceElement& element) {
   static constexpr std::array<const char*, std::variant_size_v<decltype(element.law)>> kWords = {
-      "damping", "spring", "rotor", "friction"};
+      "damping", "spring", "rotor", "friction", "stop", "curve"};
   return kWords.at(element.law.index());
 }
 
 bool ActsOnLength(const Mechanism& mechanism, const ForceElement& element) {
   if (element.bushing >= 0) return element.coordinate < 3;
-  return element.drive >= 0 ||
+  return element.drive >= 0 || element.spring >= 0 ||
          IsLength(mechanism.joints[static_cast<size_t>(element.joint)].kind, element.coordinate);
 }
 
@@ -175,7 +175,43 @@ std::string BushingWord(const ForceElement& element) {
 
 bool HasFriction(const ForceElement& element) {
   const auto* friction = std::get_if<FrictionLaw>(&element.law);
-  return friction != nullptr && (friction->breakaway > 0.0 || friction->per_load() > 0.0);
+  return friction != nullptr && (friction->breakaway > 0.0 || friction->by_load());
+}
+
+namespace {
+
+// Free, and beyond each end: by (1), with c δ̇ cut to e, and without force.
+int PieceOf(const StopLaw& law, double q, double v) {
+  const bool above = q > law.upper;
+  if (!above && !(q < law.lower)) return 0;
+  const double depth = above ? q - law.upper : law.lower - q, rate = above ? v : -v;
+  const int first = above ? 1 : 4;
+  if (law.dissipation > 0.0) return first + (1.0 + law.dissipation * rate < 0.0 ? 2 : 0);
+  const double e = law.stiffness * std::pow(depth, law.exponent);
+  return first + (law.damping * rate > e ? 1 : law.damping * rate < -e ? 2 : 0);
+}
+bool IsCorner(const CurveLaw::Knot& knot) { return knot.slope_before != knot.slope_after; }
+int PieceOf(const CurveLaw& law, double q, double v) {
+  const double x = law.of_rate ? v : q;
+  return static_cast<int>(std::ranges::count_if(
+      law.knots, [x](const CurveLaw::Knot& knot) { return IsCorner(knot) && knot.at < x; }));
+}
+template <typename Law>
+int PieceOf(const Law& /*law*/, double /*q*/, double /*v*/) {
+  return 0;
+}
+
+}  // namespace
+
+int PieceOf(const ForceElement& element, double position, double rate) {
+  return std::visit([&](const auto& law) { return PieceOf(law, position, rate); }, element.law);
+}
+
+bool HasCorners(const ForceElement& element) {
+  if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
+    return std::ranges::any_of(curve->knots, IsCorner);
+  }
+  return std::holds_alternative<StopLaw>(element.law);
 }
 
 std::string FirstFriction(const Mechanism& mechanism) {
@@ -198,6 +234,9 @@ std::string Described(const Mechanism& mechanism, const ForceElement& element) {
   }
   if (element.drive >= 0) {
     return word + " of drive '" + mechanism.drives[static_cast<size_t>(element.drive)].name + "'";
+  }
+  if (element.spring >= 0) {
+    return word + " along '" + mechanism.springs[static_cast<size_t>(element.spring)].name + "'";
   }
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
   if (ActsOnBall(mechanism, element))

@@ -6,6 +6,7 @@
 // The joint kinds and their coordinates: joint_kinds.h.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <memory>
@@ -309,17 +310,52 @@ struct RotorLaw {
   [[nodiscard]] double reflected() const { return ratio * ratio * inertia; }  ///< [kg m² or kg]
 };
 
-/// Dry friction: force −(Fc + (Fs − Fc) exp(−(q̇/vs)²) + μ r N) sign q̇, N: what the joint bears
+/// Dry friction: force −(Fc + (Fs − Fc) exp(−(q̇/vs)²) + S) sign q̇, S by what the joint bears
 /// [Armstrong-Hélouvry 1991]; viscous friction beside it is damping. At rest the force lies
-/// anywhere in ±(Fs + μ r N), and with it drive forces within a band.
+/// anywhere in ±(Fs + S), and with it drive forces within a band. With F the joint's reaction force,
+/// F_n its part across the axis a, M its moment about M's origin,
+///   S = μ (r |F_n| + r_t |a·F|),  with two bearings at ±ℓ/2 along a, which share F_n and M,
+///   S = μ (r |F_n/2 + M × a/ℓ| + r |F_n/2 − M × a/ℓ| + r_t |a·F|);                            (1)
+/// of a ball S = μ r |F| about each axis; of a coupling S = μ |Q|, Q its force along the coordinate.
 struct FrictionLaw {
   double coulomb = 0.0;        ///< Fc [N or N m], >= 0
   double breakaway = 0.0;      ///< Fs, >= Fc
   double stribeck_rate = 1.0;  ///< vs [m/s or rad/s] >= 0; 0: all that slides feels Fc
-  double coefficient = 0.0;    ///< μ >= 0: adds μ r N, N the joint's reaction across its axis
-  double radius = 1.0;         ///< r of a journal [m], > 0; 1 along lengths
+  double coefficient = 0.0;    ///< μ >= 0; 0: no friction by load
+  double radius = 1.0;         ///< r of a journal or ball [m], > 0; 1 along lengths
+  double length = std::numeric_limits<double>::infinity();  ///< ℓ [m], > 0
+  double thrust_radius = 0.0;  ///< r_t of the collar that bears the thrust [m], >= 0
+  int coupling = -1;           ///< whose force it follows instead, index
 
-  [[nodiscard]] double per_load() const { return coefficient * radius; }  ///< μ r [m or 1]
+  [[nodiscard]] bool by_load() const { return coefficient > 0.0; }
+  /// The most that S grows with a force [m or 1].
+  [[nodiscard]] double per_load() const {
+    return coefficient * (coupling >= 0 ? 1.0 : std::max(radius, thrust_radius));
+  }
+};
+
+/// What acts beyond the ends of a way, and pushes back only: with the depth δ = q − upper (or lower
+/// − q), e = k δⁿ and either damping c or dissipation a
+///   N = e + c δ̇, c δ̇ within ±e [Modelica Standard Library, ElastoGap],                          (1)
+///   N = e (1 + a δ̇), at least 0 [Hunt, Crossley 1975, eq. 2];  F = −N beyond upper, N below lower
+struct StopLaw {
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();  ///< at least one is finite
+  double stiffness = 0.0;                                  ///< k [N/mⁿ or N m/radⁿ], > 0
+  double exponent = 1.0;                                   ///< n, >= 1
+  double damping = 0.0;                                    ///< c [N s/m or N m s/rad], >= 0
+  double dissipation = 0.0;                                ///< a [s/m or s/rad], >= 0
+};
+
+/// A characteristic curve: force over the coordinate or over its rate, continuous, cubic between
+/// knots and straight beyond them; positive as a drive's force.
+struct CurveLaw {
+  struct Knot {
+    double at = 0.0, force = 0.0;
+    double slope_before = 0.0, slope_after = 0.0;  ///< of the force; beyond the ends, all the way
+  };
+  bool of_rate = false;     ///< over the rate, else over the coordinate
+  std::vector<Knot> knots;  ///< at least two, `at` increasing
 };
 
 /// Frames F on the parent and M on the child that a bushing joins. Its six coordinates are the
@@ -357,7 +393,7 @@ struct Contact {
 [[nodiscard]] const char* WordOf(Contact::Kind kind);
 
 /// What acts along one scalar coordinate q of a joint or a bushing or along the length q of a
-/// distance drive; its force is positive as a drive's there, exerted by the joint's parent on its
+/// distance drive or a spring; its force is positive as a drive's there, exerted by the joint's parent on its
 /// child. Parts of the reactions are these forces no more than drive forces are.
 ///
 /// A ball's rotation has no coordinates to act along: its three elements, of one law, have the
@@ -370,8 +406,9 @@ struct ForceElement {
   std::string name;
   int joint = -1, coordinate = 0;  ///< the coordinate, or …
   int drive = -1;                  ///< … the distance drive, or …
-  int bushing = -1;                ///< … `coordinate` of this one
-  std::variant<DampingLaw, SpringLaw, RotorLaw, FrictionLaw> law;
+  int bushing = -1;                ///< … `coordinate` of this one, or …
+  int spring = -1;                 ///< … the length of this one
+  std::variant<DampingLaw, SpringLaw, RotorLaw, FrictionLaw, StopLaw, CurveLaw> law;
 };
 
 /// What becomes of bodies in a robot's file that nothing ties to the world.
@@ -416,6 +453,24 @@ struct Mechanism {
   [[nodiscard]] bool HasParameter(const std::string& parameter_name) const;
 };
 
+/// Takes springs out for which `goes(spring)` holds, with the elements along them.
+template <typename Goes>
+void EraseSprings(Mechanism* mechanism, const Goes& goes) {
+  std::vector<int> at;
+  int kept = 0;
+  std::vector<SpringDamper> left;
+  for (SpringDamper& spring : mechanism->springs) {
+    const bool stays = !goes(spring);
+    at.push_back(stays ? kept++ : -1);
+    if (stays) left.push_back(spring);
+  }
+  mechanism->springs = std::move(left);
+  std::erase_if(mechanism->elements, [&](ForceElement& element) {
+    if (element.spring >= 0) element.spring = at[static_cast<size_t>(element.spring)];
+    return element.spring < 0 && element.joint < 0 && element.drive < 0 && element.bushing < 0;
+  });
+}
+
 /// How to read a force signal: printed in every report.
 struct SignalSheet {
   std::string signal;  ///< channel name without the witness
@@ -441,6 +496,12 @@ struct SignalSheet {
 [[nodiscard]] bool ActsOnBall(const Mechanism& mechanism, const ForceElement& element);
 /// Adds the three of a ball's rotation, NAME.x, NAME.y, NAME.z, of a joint of this kind.
 void AddOfBall(const ForceElement& element, JointKind kind, std::vector<ForceElement>* elements);
+/// Which smooth piece of a law a motion is on: another number beyond a corner, where forces are
+/// continuous and their derivatives are not. Integrators step onto corners by it; no force is
+/// computed from it.
+[[nodiscard]] int PieceOf(const ForceElement& element, double position, double rate);
+/// True for laws that have more than one piece with corners between.
+[[nodiscard]] bool HasCorners(const ForceElement& element);
 /// "rotor of joint 'hip'", for messages; with the coordinate's number where there are several.
 [[nodiscard]] std::string Described(const Mechanism& mechanism, const ForceElement& element);
 /// Rate of the coordinate of an element up to which it counts as at rest in a motion of this

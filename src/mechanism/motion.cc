@@ -192,24 +192,72 @@ void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample) {
       out.moment[c] = Evaluate(load.moment[c], t_s).value;
     }
   }
+  for (const Switch& one : motion.switches) {
+    if (sample->engaged.size() <= one.element) sample->engaged.resize(one.element + 1, 1.0);
+    sample->engaged[one.element] = Evaluate(one.share, t_s).value;
+  }
 }
 
-std::vector<double> BreakTimes(const Motion& motion) {
-  std::vector<double> breaks;
-  const auto add = [&breaks](const Profile& profile) {
-    const std::vector<double> times = BreakTimes(profile);
-    breaks.insert(breaks.end(), times.begin(), times.end());
+namespace {
+
+template <typename TimesOf>
+std::vector<double> AllTimes(const Motion& motion, const TimesOf& times_of) {
+  std::vector<double> all;
+  const auto add = [&](const Profile& profile) {
+    const std::vector<double> times = times_of(profile);
+    all.insert(all.end(), times.begin(), times.end());
   };
   for (const Command& command : motion.commands) add(command.profile);
   for (const DriveForce& force : motion.forces) add(force.force);
+  for (const Switch& one : motion.switches) add(one.share);
   for (const Load& load : motion.loads) {
     for (int c = 0; c < 3; ++c) {
       add(load.force[c]);
       add(load.moment[c]);
     }
   }
-  std::sort(breaks.begin(), breaks.end());
-  return breaks;
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+}  // namespace
+
+std::vector<double> BreakTimes(const Motion& motion) {
+  return AllTimes(motion, [](const Profile& profile) { return BreakTimes(profile); });
+}
+
+std::vector<double> JumpTimes(const Motion& motion) {
+  return AllTimes(motion, [](const Profile& profile) { return JumpTimes(profile); });
+}
+
+// Between breaks signals are smooth, and do not vanish at all of these times by chance.
+std::vector<size_t> SwitchedOff(const Motion& motion, double from_s, double to_s) {
+  constexpr int kLooks = 7;
+  std::vector<size_t> off;
+  for (const Switch& one : motion.switches) {
+    bool zero = true;
+    for (int k = 1; k < kLooks && zero; ++k) {
+      zero = Evaluate(one.share, from_s + (to_s - from_s) * k / kLooks).value == 0.0;
+    }
+    if (zero) off.push_back(one.element);
+  }
+  std::ranges::sort(off);
+  return off;
+}
+
+void UntilJump::StartFrom(double from_s) {
+  before_s_ = std::numeric_limits<double>::infinity();
+  for (const double at_s : jumps_s_) {
+    if (BeforeJump(at_s) <= from_s) continue;
+    before_s_ = BeforeJump(at_s);
+    return;
+  }
+}
+
+bool UntilJump::IsJump(double t_s) const {
+  return std::ranges::any_of(jumps_s_, [t_s](double at_s) {
+    return BeforeJump(at_s) < t_s && BeforeJump(t_s) < at_s;
+  });
 }
 
 void BodyStates::Resize(size_t bodies) {

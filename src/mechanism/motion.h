@@ -1,9 +1,11 @@
 // Motion: what a scenario commands, as scalar coordinates with time profiles, and its loads.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -111,6 +113,13 @@ struct DriveForce {
   Profile force;  ///< [N] or [N m]
 };
 
+/// A force element that acts with a share of its force: a brake or clutch that is switched.
+struct Switch {
+  std::string name;   ///< of the element, or of a ball's three
+  size_t element = 0; ///< index into Mechanism::elements; with dry friction, or a curve of the rate
+  Profile share;      ///< >= 0
+};
+
 /// Where a DOF starts that moves by forces.
 struct InitialValue {
   std::string name;
@@ -151,6 +160,7 @@ struct Motion {
   std::vector<Command> commands;
   std::vector<Load> loads;
   std::vector<DriveForce> forces = {};     ///< free motion only; no drive is commanded and forced
+  std::vector<Switch> switches = {};
   std::vector<InitialValue> initial = {};  ///< one per DOF that no command holds
   std::vector<MotionTable> tables = {};    ///< those that profiles above were made of
 
@@ -180,6 +190,7 @@ struct CommandSample {
   double time_s = 0.0;
   VecX position, velocity, acceleration;
   std::vector<LoadSample> loads;
+  std::vector<double> engaged = {};  ///< BodyStates::engaged
 };
 
 /// Evaluates every profile at t. Allocates only when `sample` is first used.
@@ -196,6 +207,23 @@ struct DrivenSample {
 /// Times [s] at which a command, given force or load of the motion changes its formula; increasing,
 /// the same time may occur more than once.
 [[nodiscard]] std::vector<double> BreakTimes(const Motion& motion);
+/// Those of them at which forces jump (JumpTimes() of profiles).
+[[nodiscard]] std::vector<double> JumpTimes(const Motion& motion);
+/// Elements that are switched off from one time to another, increasing: they neither hold nor slide.
+[[nodiscard]] std::vector<size_t> SwitchedOff(const Motion& motion, double from_s, double to_s);
+/// What is to be evaluated at t on the way to the next jump after `from_s`: t, or, at that jump, a
+/// time before it.
+class UntilJump {
+ public:
+  explicit UntilJump(const Motion& motion) : jumps_s_(JumpTimes(motion)) {}
+  void StartFrom(double from_s);
+  [[nodiscard]] double operator()(double t_s) const { return std::min(t_s, before_s_); }
+  [[nodiscard]] bool IsJump(double t_s) const;
+
+ private:
+  std::vector<double> jumps_s_;
+  double before_s_ = std::numeric_limits<double>::infinity();
+};
 
 // Where the bodies of a mechanism are and how they move, in maximal coordinates.
 
@@ -212,6 +240,11 @@ struct BodyStates {
   std::vector<double> coupled;
   /// The same per force element, drive and prescribed joint (element_rows.h).
   std::vector<double> turns;
+  /// Share of its force with which a force element acts (Switch); of those beyond the end 1.
+  std::vector<double> engaged = {};
+  [[nodiscard]] double Engaged(size_t element) const {
+    return element < engaged.size() ? engaged[element] : 1.0;
+  }
 
   void Resize(size_t bodies);
 };

@@ -2,6 +2,7 @@
 
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -18,6 +19,24 @@ std::string TextOf(const SpringLaw& law) {
   if (law.free != 0.0) text += fmt::format(", free: {}", law.free);
   if (law.preload != 0.0) text += fmt::format(", preload: {}", law.preload);
   return text;
+}
+std::string TextOf(const StopLaw& law) {
+  std::string text = fmt::format("stiffness: {}", law.stiffness);
+  if (std::isfinite(law.lower)) text += fmt::format(", lower: {}", law.lower);
+  if (std::isfinite(law.upper)) text += fmt::format(", upper: {}", law.upper);
+  if (law.exponent != 1.0) text += fmt::format(", exponent: {}", law.exponent);
+  if (law.damping != 0.0) text += fmt::format(", damping: {}", law.damping);
+  if (law.dissipation != 0.0) text += fmt::format(", dissipation: {}", law.dissipation);
+  return text;
+}
+std::string TextOf(const CurveLaw& law) {
+  std::vector<std::string> points, slopes;
+  for (const CurveLaw::Knot& knot : law.knots) {
+    points.push_back(fmt::format("[{}, {}]", knot.at, knot.force));
+    slopes.push_back(fmt::format("[{}, {}]", knot.slope_before, knot.slope_after));
+  }
+  return fmt::format("{}points: [{}], slopes: [{}]", law.of_rate ? "of: rate, " : "",
+                     fmt::join(points, ", "), fmt::join(slopes, ", "));
 }
 std::string TextOf(const RotorLaw& law) {
   return fmt::format("inertia: {}, ratio: {}", law.inertia, law.ratio);
@@ -50,10 +69,17 @@ std::string FileName(const Mechanism& mechanism, const ForceElement& element) {
 
 std::string ElementText(const ForceElement& element, const std::string& place, bool slides) {
   const auto* friction = std::get_if<FrictionLaw>(&element.law);
-  const bool journal = friction != nullptr && friction->per_load() > 0.0 && !slides;
+  std::string bearings;
+  if (friction != nullptr && friction->by_load() && friction->coupling < 0) {
+    if (!slides && friction->radius > 0.0) bearings += fmt::format(", radius: {}", friction->radius);
+    if (std::isfinite(friction->length)) bearings += fmt::format(", length: {}", friction->length);
+    if (friction->thrust_radius > 0.0) {
+      bearings += fmt::format(", thrust_radius: {}", friction->thrust_radius);
+    }
+  }
   return fmt::format("kind: {}, {}, {}{}", WordOf(element), place,
                      std::visit([](const auto& law) { return TextOf(law); }, element.law),
-                     journal ? fmt::format(", radius: {}", friction->radius) : "");
+                     bearings);
 }
 
 std::string CarrierText(const RotorAxis& axis, const std::string& body) {

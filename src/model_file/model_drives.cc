@@ -465,9 +465,6 @@ void ExpandLegs(ModelValues* values, ModelBlocks* blocks) {
 
 namespace {
 
-double FromRpm(double value) { return value * std::numbers::pi / 30.0; }
-constexpr UnitSuffix kRpm{"_rpm", "rad/s", FromRpm};
-
 bool Turns(const Drive& drive, const std::vector<Joint>& joints) {
   const auto* joint = std::get_if<JointDrive>(&drive.kind);
   return joint != nullptr &&

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 
 #include "base/text.h"
@@ -11,16 +13,27 @@
 namespace mbv::internal {
 namespace {
 
-const std::vector<std::string> kKinds = {"damping", "spring", "rotor", "friction", "bushing"};
+const std::vector<std::string> kKinds = {"damping",  "spring", "rotor", "friction",
+                                         "stop",     "curve",  "bushing"};
 
 // The keys of a kind beside those of its place.
 const std::vector<std::string>& KeysOf(const std::string& kind) {
   static const std::map<std::string, std::vector<std::string>> keys = {
-      {"damping", {"damping"}},
-      {"spring", {"stiffness", "polynomial", "free", "free_deg", "free_mm", "preload"}},
-      {"rotor", {"inertia", "ratio", "gyroscopic", "axis_on", "axis"}},
+      {"damping", {"damping", "damping_per_mm", "damping_per_deg"}},
+      {"spring",
+       {"stiffness", "stiffness_per_mm", "stiffness_per_deg", "polynomial", "free", "free_deg",
+        "free_mm", "preload"}},
+      {"rotor", {"inertia", "inertia_kgcm2", "ratio", "gyroscopic", "axis_on", "axis"}},
+      {"stop",
+       {"lower", "lower_deg", "lower_mm", "upper", "upper_deg", "upper_mm", "stiffness",
+        "stiffness_per_mm", "stiffness_per_deg", "exponent", "damping", "damping_per_mm",
+        "damping_per_deg", "dissipation"}},
+      {"curve",
+       {"of", "points", "points_deg", "points_mm", "points_rpm", "interpolation", "beyond",
+        "slopes"}},
       {"bushing", {"parent", "child", "stiffness", "damping"}},
-      {"friction", {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius"}}};
+      {"friction", {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius", "radius_mm", "length",
+        "length_mm", "thrust_radius", "thrust_radius_mm", "coupling", "efficiency"}}};
   return keys.at(kind);
 }
 
@@ -40,7 +53,7 @@ void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
   const YamlNode* kind = entry.value->is_map() ? entry.value->Find("kind") : nullptr;
   std::vector<std::string> keys = {"kind"};
   if (kind == nullptr || kind->text != "bushing") {
-    keys.insert(keys.end(), {"joint", "coordinate", "drive"});
+    keys.insert(keys.end(), {"joint", "coordinate", "drive", "spring", "from", "to"});
   }
   for (const std::string& word : kKinds) {
     // Of a kind that is not known, any key is.
@@ -68,8 +81,9 @@ void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
 
 bool ElementReader::SuitsBall(const YamlMap& map, const YamlNode& kind) {
   YamlReader& yaml = values_.yaml();
-  if (kind.text == "spring") {
-    yaml.Error(kind, fmt::format("{}: a ball's rotation has no position for a spring", map.path()),
+  if (kind.text == "spring" || kind.text == "stop" || kind.text == "curve") {
+    yaml.Error(kind,
+               fmt::format("{}: a ball's rotation has no position for a {}", map.path(), kind.text),
                "kind: bushing, with the joint's frames and stiffness: [0, 0, 0, k, k, k]");
     return false;
   }
@@ -85,12 +99,16 @@ bool ElementReader::SuitsBall(const YamlMap& map, const YamlNode& kind) {
 
 bool ElementReader::ReadPlace(const Block& block, const YamlMap& map, ForceElement* element) {
   YamlReader& yaml = values_.yaml();
-  if (map.Has("joint") == map.Has("drive")) {
-    yaml.Error(*map.node(), fmt::format("{} needs either joint or drive", map.path()),
-               "joint: the joint along whose coordinate it acts; drive: along that drive's");
+  const bool points = map.Has("from") || map.Has("to");
+  if (map.Has("joint") + map.Has("drive") + map.Has("spring") + points != 1) {
+    yaml.Error(*map.node(),
+               fmt::format("{} needs one of joint, drive, spring, and from with to", map.path()),
+               "joint: the joint along whose coordinate it acts; drive: along that drive's; "
+               "spring: along its length; from, to: along the distance of two frames");
     return false;
   }
   if (map.Has("drive")) return ReadDrive(block, map, element);
+  if (map.Has("spring") || points) return ReadSpringPlace(block, map, element);
   if (TakeRotation(block, map, element)) return true;
   const auto at = ReadJointCoordinate(joints_, block, map, {}, &yaml);
   if (!at) return false;
@@ -113,6 +131,41 @@ bool ElementReader::TakeRotation(const Block& block, const YamlMap& map, ForceEl
   element->joint = joint;
   element->coordinate = FirstOfBall(kind);
   return true;
+}
+
+// Between two points acts a spring without stiffness, which has the element's name.
+bool ElementReader::ReadSpringPlace(const Block& block, const YamlMap& map, ForceElement* element) {
+  YamlReader& yaml = values_.yaml();
+  if (const YamlNode* coordinate = map.Find("coordinate")) {
+    yaml.Error(*coordinate, fmt::format("{}: a distance is one coordinate", map.path()));
+    return false;
+  }
+  if (!map.Has("spring")) {
+    SpringDamper between{.name = element->name};
+    if (!names_.Ends(block, map, &between)) return false;
+    if (IndexOf(springs_, between.name) >= 0) {
+      yaml.Error(*map.node(),
+                 fmt::format("{}: there is a spring '{}' already", map.path(), between.name),
+                 "give the element another name, or let it act along that spring: spring: NAME");
+      return false;
+    }
+    element->spring = static_cast<int>(springs_.size());
+    springs_.push_back(std::move(between));
+    return true;
+  }
+  const YamlNode& node = *map.Find("spring");
+  const auto name = yaml.Text(node, map.PathOf("spring"));
+  if (!name) return false;
+  for (const std::string& level : block.levels) {
+    if (element->spring < 0) element->spring = IndexOf(springs_, level + *name);
+  }
+  if (element->spring >= 0) return true;
+  std::vector<std::string> names;
+  for (const SpringDamper& spring : springs_) names.push_back(spring.name);
+  yaml.Error(node,
+             fmt::format("{} = {}: there is no such spring", map.PathOf("spring"), Describe(node)),
+             DidYouMean(*name, names));
+  return false;
 }
 
 // A joint drive stands for its coordinate.
@@ -153,30 +206,254 @@ bool ElementReader::ReadLaw(const Block& block, const YamlMap& map, const std::s
     if (law && element != nullptr) element->law = *law;
     return law.has_value();
   };
-  if (kind == "damping") return take(ReadDamping(block, map));
+  if (kind == "damping") return take(ReadDamping(block, map, element));
+  if (kind == "rotor" && element != nullptr && element->spring >= 0) {
+    values_.yaml().Error(*map.node(), fmt::format("{}: a distance turns no rotor", map.path()),
+                         "joint: or drive: along whose coordinate the rotor turns");
+    return false;
+  }
   if (kind == "rotor") return take(ReadRotor(block, map, element));
   if (kind == "friction") return take(ReadFriction(block, map, element));
+  if (kind == "stop") return take(ReadStop(block, map, element));
+  if (kind == "curve") return take(ReadCurve(block, map, element));
   return take(ReadSpring(block, map, element));
 }
 
-std::optional<DampingLaw> ElementReader::ReadDamping(const Block& block, const YamlMap& map) {
-  if (map.Required("damping") == nullptr) return std::nullopt;
-  const auto damping = NotNegative(block, map, "damping");
+bool ElementReader::IsAlongLength(const ForceElement& element) const {
+  return element.joint < 0 || IsLength(joints_.joints[element.joint].kind, element.coordinate);
+}
+
+std::string ElementReader::NameOf(const ForceElement& element) const {
+  if (element.joint >= 0) return joints_.joints[element.joint].name;
+  return element.drive >= 0 ? drives_[static_cast<size_t>(element.drive)].name
+                            : springs_[static_cast<size_t>(element.spring)].name;
+}
+
+// Per metre or radian, or per millimetre or degree; at least 0, and required.
+std::optional<double> ElementReader::Slope(const Block& block, const YamlMap& map,
+                                           const std::string& key, const ForceElement* element) {
+  YamlReader& yaml = values_.yaml();
+  const auto found = map.FindInUnit(key, {kPlain, kPerMm, kPerDeg});
+  if (found.node == nullptr) {
+    (void)map.Required(key);
+    return std::nullopt;
+  }
+  const std::string path = map.PathOf(found.key);
+  if (element != nullptr && !found.unit.Suits(IsAlongLength(*element) ? "m" : "rad")) {
+    yaml.Error(*found.node, fmt::format("{}: the coordinate of '{}' is {}", path, NameOf(*element),
+                                        IsAlongLength(*element) ? "a length" : "an angle"));
+    return std::nullopt;
+  }
+  const auto value = values_.Number(block, *found.node, path, found.unit);
+  if (!value || *value >= 0.0) return value;
+  yaml.Error(*found.node, fmt::format("{} = {} violates {} >= 0", path, *value, key));
+  return std::nullopt;
+}
+
+std::optional<DampingLaw> ElementReader::ReadDamping(const Block& block, const YamlMap& map,
+                                                     const ForceElement* element) {
+  const auto damping = Slope(block, map, "damping", element);
   if (!damping) return std::nullopt;
   return DampingLaw{*damping};
+}
+
+std::optional<StopLaw> ElementReader::ReadStop(const Block& block, const YamlMap& map,
+                                               const ForceElement* element) {
+  YamlReader& yaml = values_.yaml();
+  StopLaw stop;
+  bool good = true;
+  const auto end = [&](const char* key, double* limit) {
+    if (map.FindInUnit(key, {kPlain, kDeg, kMm}).node == nullptr) return false;
+    const auto at =
+        element == nullptr
+            ? std::optional(0.0)
+            : ReadInCoordinateUnit(&values_, block, map, key, IsAlongLength(*element),
+                                   NameOf(*element));
+    good = good && at.has_value();
+    *limit = at.value_or(kNan);
+    return true;
+  };
+  const bool has_lower = end("lower", &stop.lower), has_upper = end("upper", &stop.upper);
+  if (!has_lower && !has_upper) {
+    yaml.Error(*map.node(), fmt::format("{} needs lower, upper, or both", map.path()),
+               "coordinates at which the stop begins to push back");
+    good = false;
+  } else if (good && element != nullptr && !(stop.lower < stop.upper)) {
+    yaml.Error(*map.node(), fmt::format("{}: lower = {} violates lower < upper = {}", map.path(),
+                                        stop.lower, stop.upper));
+    good = false;
+  }
+  const auto stiffness = Slope(block, map, "stiffness", element);
+  if (stiffness && *stiffness == 0.0) {
+    yaml.Error(*map.node(), fmt::format("{}: stiffness = 0 stops nothing", map.path()));
+    good = false;
+  }
+  const auto exponent =
+      map.Has("exponent") ? values_.Number(block, map, "exponent", {kPlain}) : 1.0;
+  if (exponent && !(*exponent >= 1.0)) {
+    yaml.Error(*map.Find("exponent"), fmt::format("{} = {} violates exponent >= 1",
+                                                  map.PathOf("exponent"), *exponent));
+    good = false;
+  }
+  const bool damps = map.FindInUnit("damping", {kPlain, kPerMm, kPerDeg}).node != nullptr;
+  const auto damping = damps ? Slope(block, map, "damping", element) : 0.0;
+  const auto dissipation = map.Has("dissipation") ? NotNegative(block, map, "dissipation") : 0.0;
+  if (damps && map.Has("dissipation")) {
+    yaml.Error(*map.node(), fmt::format("{} has both damping and dissipation", map.path()),
+               "damping: c of c times the rate; dissipation: a of k depth^n (1 + a times the rate)");
+    good = false;
+  }
+  if (!good || !stiffness || !exponent || !damping || !dissipation) return std::nullopt;
+  stop.stiffness = *stiffness;
+  stop.exponent = *exponent;
+  stop.damping = *damping;
+  stop.dissipation = *dissipation;
+  return stop;
+}
+
+namespace {
+
+// Slopes of the monotone cubic through points [Fritsch, Butland 1984, as in PCHIP].
+void MakeMonotone(std::vector<CurveLaw::Knot>* knots) {
+  const size_t n = knots->size();
+  std::vector<double> h, secant;
+  for (size_t i = 1; i < n; ++i) {
+    h.push_back((*knots)[i].at - (*knots)[i - 1].at);
+    secant.push_back(((*knots)[i].force - (*knots)[i - 1].force) / h.back());
+  }
+  // Of the parabola through three points, as far as that keeps the sense of the first secant.
+  const auto end = [](double h0, double h1, double d0, double d1) {
+    const double slope = ((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
+    if (slope * d0 <= 0.0) return 0.0;
+    return d0 * d1 <= 0.0 && std::abs(slope) > 3.0 * std::abs(d0) ? 3.0 * d0 : slope;
+  };
+  for (size_t i = 0; i < n; ++i) {
+    double slope = secant[0];
+    if (n > 2 && i == 0) {
+      slope = end(h[0], h[1], secant[0], secant[1]);
+    } else if (n > 2 && i == n - 1) {
+      slope = end(h[n - 2], h[n - 3], secant[n - 2], secant[n - 3]);
+    } else if (n > 2) {
+      const double d0 = secant[i - 1], d1 = secant[i];
+      const double w0 = 2.0 * h[i] + h[i - 1], w1 = h[i] + 2.0 * h[i - 1];
+      slope = d0 * d1 <= 0.0 ? 0.0 : (w0 + w1) / (w0 / d0 + w1 / d1);
+    }
+    (*knots)[i].slope_before = (*knots)[i].slope_after = slope;
+  }
+}
+
+}  // namespace
+
+// Pairs [a, b], the first in a unit, increasing; at least two.
+std::optional<std::vector<std::array<double, 2>>> ElementReader::ReadPairs(
+    const Block& block, const YamlNode& node, const std::string& path, const UnitSuffix& unit) {
+  YamlReader& yaml = values_.yaml();
+  const auto items = yaml.Items(node, path);
+  if (!items) return std::nullopt;
+  std::vector<std::array<double, 2>> pairs;
+  for (size_t i = 0; i < items->size(); ++i) {
+    const std::string at = fmt::format("{}[{}]", path, i);
+    const auto two = yaml.Items(*(*items)[i], at, 2);
+    if (!two) return std::nullopt;
+    const auto a = values_.Number(block, *(*two)[0], at + "[0]", unit);
+    const auto b = values_.Number(block, *(*two)[1], at + "[1]");
+    if (!a || !b) return std::nullopt;
+    pairs.push_back({*a, *b});
+  }
+  return pairs;
+}
+
+std::optional<CurveLaw> ElementReader::ReadCurve(const Block& block, const YamlMap& map,
+                                                 const ForceElement* element) {
+  YamlReader& yaml = values_.yaml();
+  CurveLaw curve;
+  bool good = true;
+  if (const YamlNode* of = map.Find("of")) {
+    const auto what = yaml.Choice(*of, map.PathOf("of"), {"position", "rate"});
+    good = what.has_value();
+    curve.of_rate = what == 1;
+  }
+  const auto found = map.FindInUnit("points", {kPlain, kDeg, kMm, kRpm});
+  if (found.node == nullptr) {
+    (void)map.Required("points");
+    return std::nullopt;
+  }
+  const std::string path = map.PathOf(found.key);
+  const bool fits = element == nullptr ||
+                    (found.unit.suffix == kRpm.suffix
+                         ? curve.of_rate && !IsAlongLength(*element)
+                         : found.unit.Suits(IsAlongLength(*element) ? "m" : "rad"));
+  if (!fits) {
+    yaml.Error(*found.node, fmt::format("{}: the {} of '{}' is not in that unit", path,
+                                        curve.of_rate ? "rate" : "coordinate", NameOf(*element)));
+    good = false;
+  }
+  const auto points = ReadPairs(block, *found.node, path, found.unit);
+  if (!points) return std::nullopt;
+  for (size_t i = 0; i < points->size(); ++i) {
+    if (i > 0 && !((*points)[i][0] > curve.knots.back().at)) {
+      yaml.Error(*found.node, fmt::format("{}[{}] = {} violates: increasing", path, i,
+                                          (*points)[i][0]));
+      return std::nullopt;
+    }
+    curve.knots.push_back({.at = (*points)[i][0], .force = (*points)[i][1]});
+  }
+  if (curve.knots.size() < 2) {
+    yaml.Error(*found.node, path + " has fewer than two points");
+    return std::nullopt;
+  }
+  if (!ReadSlopes(block, map, &curve) || !good) return std::nullopt;
+  return curve;
+}
+
+// As stated, or by the interpolation, and what lies beyond the points.
+bool ElementReader::ReadSlopes(const Block& block, const YamlMap& map, CurveLaw* curve) {
+  YamlReader& yaml = values_.yaml();
+  std::vector<CurveLaw::Knot>& knots = curve->knots;
+  if (const YamlNode* node = map.Find("slopes")) {
+    const auto slopes = ReadPairs(block, *node, map.PathOf("slopes"), kPlain);
+    if (!slopes) return false;
+    if (slopes->size() == knots.size() && !map.Has("interpolation") && !map.Has("beyond")) {
+      for (size_t i = 0; i < knots.size(); ++i) {
+        knots[i].slope_before = (*slopes)[i][0];
+        knots[i].slope_after = (*slopes)[i][1];
+      }
+      return true;
+    }
+    yaml.Error(*node, fmt::format("{}: one pair [before, after] per point, without interpolation "
+                                  "and beyond",
+                                  map.PathOf("slopes")));
+    return false;
+  }
+  const YamlNode *way = map.Find("interpolation"), *beyond = map.Required("beyond");
+  const auto interpolation =
+      way == nullptr
+          ? std::optional<int>(0)
+          : yaml.Choice(*way, map.PathOf("interpolation"), {"monotone", "linear"});
+  const auto outside = beyond == nullptr
+                           ? std::optional<int>()
+                           : yaml.Choice(*beyond, map.PathOf("beyond"), {"held", "linear"});
+  if (!interpolation || !outside) return false;
+  MakeMonotone(&knots);
+  for (size_t i = 1; i < knots.size() && *interpolation == 1; ++i) {
+    const double secant =
+        (knots[i].force - knots[i - 1].force) / (knots[i].at - knots[i - 1].at);
+    knots[i - 1].slope_after = knots[i].slope_before = secant;
+  }
+  const bool straight = *outside == 1;
+  knots.front().slope_before = straight ? knots.front().slope_after : 0.0;
+  knots.back().slope_after = straight ? knots.back().slope_before : 0.0;
+  return true;
 }
 
 std::optional<SpringLaw> ElementReader::ReadSpring(const Block& block, const YamlMap& map,
                                                    const ForceElement* element) {
   SpringLaw spring;
-  const auto polynomial = ReadPolynomial(block, map);
+  const auto polynomial = ReadPolynomial(block, map, element);
   std::optional<double> free = 0.0;
   if (element != nullptr) {
-    const bool on_joint = element->drive < 0;
-    const Joint* joint = on_joint ? &joints_.joints[element->joint] : nullptr;
-    free = ReadInCoordinateUnit(
-        &values_, block, map, "free", !on_joint || IsLength(joint->kind, element->coordinate),
-        on_joint ? joint->name : drives_[static_cast<size_t>(element->drive)].name);
+    free = ReadInCoordinateUnit(&values_, block, map, "free", IsAlongLength(*element),
+                                NameOf(*element));
   }
   std::optional<double> preload = 0.0;
   if (map.Has("preload")) preload = values_.Number(block, map, "preload", {kPlain});
@@ -186,15 +463,17 @@ std::optional<SpringLaw> ElementReader::ReadSpring(const Block& block, const Yam
 
 // k, k2, …
 std::optional<std::vector<double>> ElementReader::ReadPolynomial(const Block& block,
-                                                                 const YamlMap& map) {
+                                                                 const YamlMap& map,
+                                                                 const ForceElement* element) {
   YamlReader& yaml = values_.yaml();
-  if (map.Has("stiffness") == map.Has("polynomial")) {
+  const bool linear = map.FindInUnit("stiffness", {kPlain, kPerMm, kPerDeg}).node != nullptr;
+  if (linear == map.Has("polynomial")) {
     yaml.Error(*map.node(), fmt::format("{} needs either stiffness or polynomial", map.path()),
                "stiffness: force by deflection; polynomial: the coefficients of x, x², x³, x⁴");
     return std::nullopt;
   }
-  if (map.Has("stiffness")) {
-    const auto stiffness = NotNegative(block, map, "stiffness");
+  if (linear) {
+    const auto stiffness = Slope(block, map, "stiffness", element);
     if (!stiffness) return std::nullopt;
     return std::vector<double>{*stiffness};
   }
@@ -203,8 +482,16 @@ std::optional<std::vector<double>> ElementReader::ReadPolynomial(const Block& bl
 
 std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlMap& map,
                                                  const ForceElement* element) {
-  const bool stated = map.Required("inertia") != nullptr;
-  const auto inertia = stated ? NotNegative(block, map, "inertia") : std::nullopt;
+  const auto found = map.FindInUnit("inertia", {kPlain, kKgCm2});
+  if (found.node == nullptr) (void)map.Required("inertia");
+  auto inertia = found.node == nullptr
+                     ? std::nullopt
+                     : values_.Number(block, *found.node, map.PathOf(found.key), found.unit);
+  if (inertia && *inertia < 0.0) {
+    values_.yaml().Error(*found.node, fmt::format("{} = {} violates inertia >= 0",
+                                                  map.PathOf(found.key), *inertia));
+    inertia.reset();
+  }
   std::optional<double> ratio = 1.0;
   if (const YamlNode* node = map.Find("ratio")) {
     ratio = values_.Number(block, map, "ratio", {kPlain});
@@ -224,46 +511,127 @@ std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlM
 
 std::optional<FrictionLaw> ElementReader::ReadFriction(const Block& block, const YamlMap& map,
                                                        const ForceElement* element) {
-  const bool loaded = map.Has("coefficient");
+  const bool geared = map.Has("coupling") || map.Has("efficiency");
+  const bool loaded = geared || map.Has("coefficient");
   auto law = ReadDry(block, map, loaded);
-  const bool fits = !loaded || element == nullptr || FitsLoad(map, *element);
-  const auto coefficient = loaded ? NotNegative(block, map, "coefficient") : 0.0;
-  const auto radius = ReadJournal(block, map, element);
-  if (!law || !fits || !coefficient || !radius) return std::nullopt;
+  if (!law || element == nullptr) return std::nullopt;
+  if (geared) return ReadGearLoss(block, map, *element, &*law) ? law : std::nullopt;
+  return ReadBearings(block, map, *element, &*law) ? law : std::nullopt;
+}
+
+// Of a gear or a screw, on one of the coordinates that it couples.
+bool ElementReader::ReadGearLoss(const Block& block, const YamlMap& map,
+                                 const ForceElement& element, FrictionLaw* law) {
+  YamlReader& yaml = values_.yaml();
+  const YamlNode* node = map.Required("coupling");
+  if (node == nullptr) return false;
+  for (const char* key : {"radius", "length", "length_mm", "thrust_radius"}) {
+    if (!map.Has(key)) continue;
+    yaml.Error(*map.Find(key), fmt::format("{} has no meaning with a coupling", map.PathOf(key)));
+    return false;
+  }
+  const auto name = yaml.Text(*node, map.PathOf("coupling"));
+  if (!name) return false;
+  for (const std::string& level : block.levels) {
+    if (law->coupling < 0) law->coupling = IndexOf(couplings_, level + *name);
+  }
+  if (law->coupling < 0) {
+    std::vector<std::string> names;
+    for (const Coupling& coupling : couplings_) names.push_back(coupling.name);
+    yaml.Error(*node,
+               fmt::format("{} = {}: there is no such coupling", map.PathOf("coupling"),
+                           Describe(*node)),
+               DidYouMean(*name, names));
+    return false;
+  }
+  const auto& terms = couplings_[static_cast<size_t>(law->coupling)].terms;
+  if (std::ranges::none_of(terms, [&](const Coupling::Term& term) {
+        return term.joint == element.joint && term.coordinate == element.coordinate;
+      })) {
+    yaml.Error(*node, fmt::format("{} = {} does not couple the coordinate of '{}'",
+                                  map.PathOf("coupling"), *name, NameOf(element)),
+               "joint: one of those that it couples");
+    return false;
+  }
+  if (map.Has("efficiency") == map.Has("coefficient")) {
+    yaml.Error(*map.node(), fmt::format("{} needs either efficiency or coefficient", map.path()),
+               "efficiency: where this coordinate drives; coefficient: friction by the coupling's "
+               "force, 1/efficiency − 1");
+    return false;
+  }
+  if (map.Has("coefficient")) {
+    const auto coefficient = NotNegative(block, map, "coefficient");
+    law->coefficient = coefficient.value_or(0.0);
+    return coefficient.has_value();
+  }
+  const auto efficiency = values_.Positive(block, map, "efficiency", {kPlain});
+  if (efficiency && *efficiency > 1.0) {
+    yaml.Error(*map.Find("efficiency"), fmt::format("{} = {} violates efficiency <= 1",
+                                                    map.PathOf("efficiency"), *efficiency));
+    return false;
+  }
+  if (efficiency) law->coefficient = 1.0 / *efficiency - 1.0;
+  return efficiency.has_value();
+}
+
+// How the joint bears its load. Only of these joints it is said what does.
+bool ElementReader::ReadBearings(const Block& block, const YamlMap& map,
+                                 const ForceElement& element, FrictionLaw* law) {
+  YamlReader& yaml = values_.yaml();
+  const JointKind kind = element.joint < 0 ? JointKind::kFree : joints_.joints[element.joint].kind;
+  const bool loaded = map.Has("coefficient"), ball = IsOfBall(kind, element.coordinate);
+  const bool slides = !ball && IsLength(kind, element.coordinate);
+  const bool known = kind == JointKind::kRevolute || kind == JointKind::kPrismatic ||
+                     kind == JointKind::kCylindrical || kind == JointKind::kUniversal ||
+                     kind == JointKind::kSpherical;
+  if (loaded && !known) {
+    yaml.Error(*map.Find("coefficient"),
+               fmt::format("{}: friction by the joint's load is known of revolute, prismatic, "
+                           "cylindrical, universal and spherical joints only",
+                           map.PathOf("coefficient")),
+               "coulomb: friction whatever the load");
+    return false;
+  }
+  const bool thrusts = loaded && !slides && !ball && kind != JointKind::kCylindrical;
+  const auto lacks = [&](const char* key, bool fits, const char* hint) {
+    const auto found = map.FindInUnit(key, {kPlain, kMm});
+    if (found.node == nullptr || fits) return false;
+    yaml.Error(*found.node, fmt::format("{} has no meaning here", map.PathOf(found.key)), hint);
+    return true;
+  };
+  const bool strange =
+      lacks("radius", loaded && !slides,
+            "radius: of the journal or ball of a joint whose friction is coefficient times radius "
+            "times its load") |
+      lacks("length", loaded && !ball,
+            "length: between the two bearings of an axis, or of a guide") |
+      lacks("thrust_radius", thrusts,
+            "thrust_radius: of the collar that bears the force along the axis of a revolute or "
+            "universal joint");
+  if (strange) return false;
+  if (!loaded) return true;
+  const auto coefficient = NotNegative(block, map, "coefficient");
+  const bool rubs = map.FindInUnit("radius", {kPlain, kMm}).node != nullptr;
+  const bool thrust = map.FindInUnit("thrust_radius", {kPlain, kMm}).node != nullptr;
+  if (!slides && !rubs && !thrust) {
+    yaml.Error(*map.node(), fmt::format("{} needs a radius", map.path()),
+               "radius: of the journal or ball of a joint whose friction is coefficient times "
+               "radius times its load");
+    return false;
+  }
+  const auto positive = [&](const char* key, bool stated, double otherwise) {
+    return stated ? values_.Positive(block, map, key, {kPlain, kMm}) : std::optional(otherwise);
+  };
+  const auto radius = positive("radius", rubs, slides ? 1.0 : 0.0);
+  const auto thrust_radius = positive("thrust_radius", thrust, 0.0);
+  const auto length = positive("length", map.FindInUnit("length", {kPlain, kMm}).node != nullptr,
+                               std::numeric_limits<double>::infinity());
+  if (!coefficient || !radius || !thrust_radius || !length) return false;
   law->coefficient = *coefficient;
   law->radius = *radius;
-  return law;
-}
-
-// Only there is it said what carries the load.
-bool ElementReader::FitsLoad(const YamlMap& map, const ForceElement& element) {
-  const JointKind kind = element.joint < 0 ? JointKind::kFree : joints_.joints[element.joint].kind;
-  if (kind == JointKind::kRevolute || kind == JointKind::kPrismatic) return true;
-  values_.yaml().Error(*map.Find("coefficient"),
-                       fmt::format("{}: friction by the joint's load is known of revolute and "
-                                   "prismatic joints only",
-                                   map.PathOf("coefficient")),
-                       "coulomb: friction whatever the load");
-  return false;
-}
-
-// A journal has a radius, a guide has none.
-std::optional<double> ElementReader::ReadJournal(const Block& block, const YamlMap& map,
-                                                 const ForceElement* element) {
-  const YamlNode* node = map.Find("radius");
-  const bool slides = element != nullptr && element->joint >= 0 &&
-                      joints_.joints[element->joint].kind == JointKind::kPrismatic;
-  if (node == nullptr && (!map.Has("coefficient") || slides || element == nullptr)) return 1.0;
-  if (node != nullptr && map.Has("coefficient") && !slides) {
-    return values_.Positive(block, map, "radius", {kPlain});
-  }
-  const bool lacking = node == nullptr;
-  values_.yaml().Error(lacking ? *map.node() : *node,
-                       lacking ? fmt::format("{} needs a radius", map.path())
-                               : fmt::format("{} has no meaning here", map.PathOf("radius")),
-                       "radius: of the journal of a revolute joint whose friction is coefficient "
-                       "times radius times its radial load");
-  return std::nullopt;
+  law->thrust_radius = *thrust_radius;
+  law->length = *length;
+  return true;
 }
 
 std::optional<FrictionLaw> ElementReader::ReadDry(const Block& block, const YamlMap& map,
@@ -340,7 +708,7 @@ bool ElementReader::ReadCarrier(const Block& block, const YamlMap& map, const Fo
 
 bool ElementReader::ReadJointAsCarrier(const YamlNode& node, const std::string& path,
                                        const ForceElement& element, RotorLaw* rotor) {
-  const Joint* joint = element.drive < 0 ? &joints_.joints[element.joint] : nullptr;
+  const Joint* joint = element.joint >= 0 ? &joints_.joints[element.joint] : nullptr;
   const bool about_axis = joint != nullptr && !IsLength(joint->kind, element.coordinate) &&
                           (element.coordinate == 0 || RowOf(joint->kind).axes == 1);
   if (!about_axis || joint->parent == 0) {

@@ -1,7 +1,9 @@
 // `elements` of a model file. Internal to the model loader.
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mechanism/mechanism.h"
@@ -16,9 +18,12 @@ struct ElementPlaces {
   const BodyNames& names;
   const ModelJoints& joints;
   const std::vector<Drive>& drives;
+  const std::vector<Coupling>& couplings;
+  std::vector<SpringDamper>& springs;  ///< of the model, and the lengths that elements add
 };
 
-/// Reads bushings, and force elements on coordinates of joints or along drives.
+/// Reads bushings, and force elements on coordinates of joints, along drives, springs or between
+/// two points.
 class ElementReader {
  public:
   ElementReader(ModelValues* values, const ElementPlaces& on, std::vector<Bushing>* bushings,
@@ -27,6 +32,8 @@ class ElementReader {
         names_(on.names),
         joints_(on.joints),
         drives_(on.drives),
+        couplings_(on.couplings),
+        springs_(on.springs),
         bushings_(*bushings),
         elements_(*elements) {}
 
@@ -36,13 +43,28 @@ class ElementReader {
   void ReadElement(const Block& block, const YamlEntry& entry);
   bool ReadPlace(const Block& block, const YamlMap& map, ForceElement* element);
   bool ReadDrive(const Block& block, const YamlMap& map, ForceElement* element);
+  bool ReadSpringPlace(const Block& block, const YamlMap& map, ForceElement* element);
   bool TakeRotation(const Block& block, const YamlMap& map, ForceElement* element);
   bool SuitsBall(const YamlMap& map, const YamlNode& kind);
   bool ReadLaw(const Block& block, const YamlMap& map, const std::string& kind,
                ForceElement* element);
-  std::optional<DampingLaw> ReadDamping(const Block& block, const YamlMap& map);
+  std::optional<DampingLaw> ReadDamping(const Block& block, const YamlMap& map,
+                                        const ForceElement* element);
   std::optional<SpringLaw> ReadSpring(const Block& block, const YamlMap& map,
                                       const ForceElement* element);
+  std::optional<StopLaw> ReadStop(const Block& block, const YamlMap& map,
+                                  const ForceElement* element);
+  std::optional<CurveLaw> ReadCurve(const Block& block, const YamlMap& map,
+                                    const ForceElement* element);
+  bool ReadSlopes(const Block& block, const YamlMap& map, CurveLaw* curve);
+  std::optional<std::vector<std::array<double, 2>>> ReadPairs(const Block& block,
+                                                              const YamlNode& node,
+                                                              const std::string& path,
+                                                              const UnitSuffix& unit);
+  std::optional<double> Slope(const Block& block, const YamlMap& map, const std::string& key,
+                              const ForceElement* element);
+  [[nodiscard]] bool IsAlongLength(const ForceElement& element) const;
+  [[nodiscard]] std::string NameOf(const ForceElement& element) const;
   std::optional<RotorLaw> ReadRotor(const Block& block, const YamlMap& map,
                                     const ForceElement* element);
   bool ReadCarrier(const Block& block, const YamlMap& map, const ForceElement* element,
@@ -55,16 +77,20 @@ class ElementReader {
   std::optional<FrictionLaw> ReadFriction(const Block& block, const YamlMap& map,
                                           const ForceElement* element);
   std::optional<FrictionLaw> ReadDry(const Block& block, const YamlMap& map, bool loaded);
-  std::optional<double> ReadJournal(const Block& block, const YamlMap& map,
-                                    const ForceElement* element);
-  bool FitsLoad(const YamlMap& map, const ForceElement& element);
-  std::optional<std::vector<double>> ReadPolynomial(const Block& block, const YamlMap& map);
+  bool ReadBearings(const Block& block, const YamlMap& map, const ForceElement& element,
+                    FrictionLaw* law);
+  bool ReadGearLoss(const Block& block, const YamlMap& map, const ForceElement& element,
+                    FrictionLaw* law);
+  std::optional<std::vector<double>> ReadPolynomial(const Block& block, const YamlMap& map,
+                                                    const ForceElement* element);
   std::optional<double> NotNegative(const Block& block, const YamlMap& map, const std::string& key);
 
   ModelValues& values_;
   const BodyNames& names_;
   const ModelJoints& joints_;
   const std::vector<Drive>& drives_;
+  const std::vector<Coupling>& couplings_;
+  std::vector<SpringDamper>& springs_;
   std::vector<Bushing>& bushings_;
   std::vector<ForceElement>& elements_;
 };

@@ -271,22 +271,25 @@ class ModelWriter {
     }
     if (!m_.couplings.empty()) text += "couplings:\n";
     for (const Coupling& coupling : m_.couplings) {
-      text += fmt::format("  {}: {{{}}}\n", FreshName(coupling.name, &taken),
+      coupling_names_.push_back(FreshName(coupling.name, &taken));
+      text += fmt::format("  {}: {{{}}}\n", coupling_names_.back(),
                           CouplingText(coupling, [this](const Coupling::Term& term) {
                             return std::pair(names_.joints[term.joint], term.coordinate);
                           }));
     }
+    for (const SpringDamper& s : m_.springs) spring_names_.push_back(FreshName(s.name, &taken));
     if (!m_.elements.empty()) text += "elements:\n";
     for (size_t b = 0; b < m_.bushings.size(); ++b) text += Written(b, &taken);
     for (const ForceElement& element : m_.elements) {
       if (element.bushing >= 0 || IsFurtherOfBall(m_, element)) continue;
       text += fmt::format(
           "  {}: {{{}}}\n", FreshName(FileName(m_, element), &taken),
-          ElementText(element, PlaceOf(element) + Carrier(element), ActsOnLength(m_, element)));
+          ElementText(element, PlaceOf(element) + Carrier(element) + Geared(element),
+                      ActsOnLength(m_, element)));
     }
     if (!m_.springs.empty()) text += "springs:\n";
     for (const SpringDamper& s : m_.springs) {
-      const std::string name = FreshName(s.name, &taken);
+      const std::string& name = spring_names_[static_cast<size_t>(&s - m_.springs.data())];
       text += fmt::format(
           "  {}: {{from: {}, to: {}, stiffness: {}, damping: {}, free_length: {}}}\n", name,
           PointRef(s.body_from, s.p_from, name + "_from"),
@@ -331,8 +334,16 @@ class ModelWriter {
     return CarrierText(axis, names_.bodies[static_cast<size_t>(axis.body)]);
   }
 
+  // The coupling whose force friction follows.
+  [[nodiscard]] std::string Geared(const ForceElement& element) const {
+    const auto* friction = std::get_if<FrictionLaw>(&element.law);
+    if (friction == nullptr || friction->coupling < 0) return "";
+    return ", coupling: " + coupling_names_[static_cast<size_t>(friction->coupling)];
+  }
+
   [[nodiscard]] std::string PlaceOf(const ForceElement& element) const {
     if (element.drive >= 0) return "drive: " + names_.drives[element.drive];
+    if (element.spring >= 0) return "spring: " + spring_names_[element.spring];
     return fmt::format(
         "joint: {}{}", names_.joints[element.joint],
         ActsOnBall(m_, element) ? kRotationText : CoordinateText(element.coordinate));
@@ -341,6 +352,7 @@ class ModelWriter {
   const Mechanism& m_;
   const WrittenNames names_;
   std::vector<Frames> frames_;
+  std::vector<std::string> spring_names_, coupling_names_;
 };
 
 }  // namespace

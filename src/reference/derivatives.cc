@@ -58,6 +58,45 @@ ForceAndSlope Vary(const RotorLaw& law, const Varying& at) {
   return {-law.reflected() * at.acceleration - Jn * at.axis.dot(at.e),
           -law.reflected() * at.d_acceleration - Jn * (at.d_axis.dot(at.e) + at.axis.dot(at.de))};
 }
+// One-sided at corners.
+ForceAndSlope Vary(const StopLaw& law, const Varying& at) {
+  const bool above = at.position > law.upper;
+  if (!above && !(at.position < law.lower)) return {};
+  const double side = above ? -1.0 : 1.0;  // the depth grows with −side q
+  const double depth = above ? at.position - law.upper : law.lower - at.position;
+  const double rate = -side * at.rate, d_depth = -side * at.d_position, d_rate = -side * at.d_rate;
+  const double e = law.stiffness * std::pow(depth, law.exponent);
+  const double de = law.exponent * e / depth * d_depth;
+  if (law.dissipation > 0.0) {
+    const double factor = 1.0 + law.dissipation * rate;
+    if (factor < 0.0) return {};
+    return {side * e * factor, side * (de * factor + e * law.dissipation * d_rate)};
+  }
+  const double damped = law.damping * rate;
+  if (damped < -e) return {};
+  if (damped > e) return {2.0 * side * e, 2.0 * side * de};
+  return {side * (e + damped), side * (de + law.damping * d_rate)};
+}
+ForceAndSlope Vary(const CurveLaw& law, const Varying& at) {
+  const std::vector<CurveLaw::Knot>& knots = law.knots;
+  const double x = law.of_rate ? at.rate : at.position;
+  const double dx = law.of_rate ? at.d_rate : at.d_position;
+  const auto next = std::ranges::find_if(knots, [x](const auto& knot) { return x < knot.at; });
+  if (next == knots.begin() || next == knots.end()) {
+    const bool before = next == knots.begin();
+    const CurveLaw::Knot& end = before ? knots.front() : knots.back();
+    const double slope = before ? end.slope_before : end.slope_after;
+    return {end.force + slope * (x - end.at), slope * dx};
+  }
+  // Newton's form with both knots twice.
+  const CurveLaw::Knot &a = *(next - 1), &b = *next;
+  const double h = b.at - a.at, secant = (b.force - a.force) / h;
+  const double c2 = (secant - a.slope_after) / h;
+  const double c3 = (a.slope_after + b.slope_before - 2.0 * secant) / (h * h);
+  const double u = x - a.at, w = x - b.at;
+  return {a.force + u * (a.slope_after + u * (c2 + w * c3)),
+          (a.slope_after + 2.0 * u * c2 + u * (2.0 * w + u) * c3) * dx};
+}
 ForceAndSlope Vary(const FrictionLaw& law, const Varying& at) {
   if (law.stribeck_rate == 0.0) return {-at.sign * law.coulomb, 0.0};
   const double slowness = at.rate / law.stribeck_rate;

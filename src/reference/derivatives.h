@@ -99,9 +99,9 @@ class ForceVariations {
   [[nodiscard]] VecX SolveForces(const VecX& wrenches);
   struct Loaded {
     size_t element = 0;
-    double slope = 0.0;   ///< s μ
-    double load = 0.0;    ///< n
-    Vec3 direction;       ///< p / n
+    double slope = 0.0;     ///< s c
+    double load = 0.0;      ///< n
+    BearingLoad direction;  ///< dn/dp
     VecX unit;            ///< forces with Gᵀ x = g
     bool shared = false;  ///< redundant constraints share the load
   };

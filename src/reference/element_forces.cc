@@ -10,13 +10,14 @@ namespace {
 struct AlongElement {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
   int friction_sign = 0;                                           // sign of the rate, 0 at rest
+  double engaged = 1.0;                                            // share that acts
   Vec3 axis_W = Vec3::Zero(), w = Vec3::Zero(), e = Vec3::Zero();  // of a rotor's carrier
 };
 
 AlongElement MotionOf(const ForceElement& element, const ScalarRow& row, const BodyStates& states,
-                      int friction_sign) {
+                      int friction_sign, double engaged) {
   AlongElement at{row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias,
-                  friction_sign};
+                  friction_sign, engaged};
   if (!IsGyroscopic(element)) return at;
   const RotorAxis& carrier = *std::get<RotorLaw>(element.law).carrier;
   const auto b = static_cast<size_t>(carrier.body);
@@ -39,10 +40,72 @@ double ForceOf(const RotorLaw& law, const AlongElement& at) {
 }
 
 double ForceOf(const FrictionLaw& law, const AlongElement& at) {
-  if (law.stribeck_rate == 0.0) return -at.friction_sign * law.coulomb;
+  const double sense = -at.friction_sign * at.engaged;
+  if (law.stribeck_rate == 0.0) return sense * law.coulomb;
   const double slowness = at.rate / law.stribeck_rate;
-  const double size = law.coulomb + (law.breakaway - law.coulomb) * std::exp(-slowness * slowness);
-  return -at.friction_sign * size;
+  return sense * (law.coulomb + (law.breakaway - law.coulomb) * std::exp(-slowness * slowness));
+}
+
+// How far beyond an end, the rate of that, and towards which side the stop pushes.
+struct Depth {
+  double depth = 0.0, rate = 0.0, side = 0.0;
+};
+Depth DepthIn(const StopLaw& law, const AlongElement& at) {
+  if (at.position > law.upper) return {at.position - law.upper, at.rate, -1.0};
+  if (at.position < law.lower) return {law.lower - at.position, -at.rate, 1.0};
+  return {};
+}
+double Elastic(const StopLaw& law, const Depth& in) {
+  return in.depth > 0.0 ? law.stiffness * std::pow(in.depth, law.exponent) : 0.0;
+}
+// (1) and (2) of StopLaw.
+double Push(const StopLaw& law, const Depth& in) {
+  const double e = Elastic(law, in);
+  if (law.dissipation > 0.0) return std::max(0.0, e * (1.0 + law.dissipation * in.rate));
+  return e + std::clamp(law.damping * in.rate, -e, e);
+}
+double ForceOf(const StopLaw& law, const AlongElement& at) {
+  const Depth in = DepthIn(law, at);
+  return in.side * Push(law, in);
+}
+
+// Force, slope and the integral of the force from the first knot.
+struct OnCurve {
+  double force = 0.0, slope = 0.0, integral = 0.0;
+};
+// Hermite's polynomials between two knots [Fritsch, Carlson 1980, eq. 2].
+OnCurve Between(const CurveLaw::Knot& a, const CurveLaw::Knot& b, double x) {
+  const double h = b.at - a.at, t = (x - a.at) / h, t2 = t * t, t3 = t2 * t;
+  const double rise = b.force - a.force, left = h * a.slope_after, right = h * b.slope_before;
+  return {.force = a.force + rise * (3.0 * t2 - 2.0 * t3) + left * (t - 2.0 * t2 + t3) +
+                   right * (t3 - t2),
+          .slope = (6.0 * rise * (t - t2) + left * (1.0 - 4.0 * t + 3.0 * t2) +
+                    right * (3.0 * t2 - 2.0 * t)) /
+                   h,
+          .integral = h * t * (a.force + rise * t2 * (1.0 - 0.5 * t) +
+                               left * t * (0.5 - t * (2.0 / 3.0 - 0.25 * t)) +
+                               right * t2 * (0.25 * t - 1.0 / 3.0))};
+}
+OnCurve Straight(const CurveLaw::Knot& from, double slope, double x) {
+  const double beyond = x - from.at;
+  return {from.force + slope * beyond, slope, beyond * (from.force + 0.5 * slope * beyond)};
+}
+OnCurve CurveAt(const CurveLaw& law, double x) {
+  const std::vector<CurveLaw::Knot>& knots = law.knots;
+  if (x <= knots.front().at) return Straight(knots.front(), knots.front().slope_before, x);
+  double sum = 0.0;
+  for (size_t i = 1; i < knots.size(); ++i) {
+    OnCurve at = Between(knots[i - 1], knots[i], std::min(x, knots[i].at));
+    at.integral += sum;
+    if (x <= knots[i].at) return at;
+    sum = at.integral;
+  }
+  OnCurve at = Straight(knots.back(), knots.back().slope_after, x);
+  at.integral += sum;
+  return at;
+}
+double ForceOf(const CurveLaw& law, const AlongElement& at) {
+  return at.engaged * CurveAt(law, law.of_rate ? at.rate : at.position).force;
 }
 
 // (5), on the body that carries a rotor.
@@ -66,6 +129,14 @@ void AddEnergy(const RotorLaw& law, const AlongElement& at, Energies* energy) {
 
 void AddEnergy(const FrictionLaw& /*law*/, const AlongElement& /*at*/, Energies* /*energy*/) {}
 
+void AddEnergy(const StopLaw& law, const AlongElement& at, Energies* energy) {
+  const Depth in = DepthIn(law, at);
+  energy->springs += Elastic(law, in) * in.depth / (law.exponent + 1.0);
+}
+void AddEnergy(const CurveLaw& law, const AlongElement& at, Energies* energy) {
+  if (!law.of_rate) energy->springs -= CurveAt(law, at.position).integral;
+}
+
 void AddPower(const DampingLaw& law, const AlongElement& at, Powers* power) {
   power->dampers += ForceOf(law, at) * at.rate;
 }
@@ -80,6 +151,15 @@ void AddPower(const FrictionLaw& law, const AlongElement& at, Powers* power) {
   power->dampers += ForceOf(law, at) * at.rate;
 }
 
+void AddPower(const StopLaw& law, const AlongElement& at, Powers* power) {
+  const Depth in = DepthIn(law, at);
+  power->springs -= Elastic(law, in) * in.rate;
+  power->dampers -= (Push(law, in) - Elastic(law, in)) * in.rate;
+}
+void AddPower(const CurveLaw& law, const AlongElement& at, Powers* power) {
+  (law.of_rate ? power->dampers : power->springs) += ForceOf(law, at) * at.rate;
+}
+
 ElementSlope Slope(const DampingLaw& law, double /*q*/) { return {0.0, law.damping}; }
 ElementSlope Slope(const SpringLaw& law, double q) {
   const double x = q - law.free;
@@ -91,6 +171,16 @@ ElementSlope Slope(const SpringLaw& law, double q) {
 }
 ElementSlope Slope(const RotorLaw& /*law*/, double /*q*/) { return {}; }
 ElementSlope Slope(const FrictionLaw& /*law*/, double /*q*/) { return {}; }
+ElementSlope Slope(const StopLaw& law, double q) {
+  const Depth in = DepthIn(law, {.position = q});
+  if (in.depth == 0.0) return {};
+  return {law.exponent * Elastic(law, in) / in.depth,
+          law.damping + law.dissipation * Elastic(law, in)};
+}
+ElementSlope Slope(const CurveLaw& law, double q) {
+  return law.of_rate ? ElementSlope{0.0, -CurveAt(law, 0.0).slope}
+                     : ElementSlope{-CurveAt(law, q).slope, 0.0};
+}
 
 // visit(law, motion) of every element.
 template <typename Visit>
@@ -100,7 +190,8 @@ void ForElements(const Mechanism& mechanism, const BodyStates& states,
     const ForceElement& element = mechanism.elements[e];
     const ScalarRow row = ElementRow(mechanism, e, states);
     const AlongElement at =
-        MotionOf(element, row, states, friction_signs.empty() ? 0 : friction_signs[e]);
+        MotionOf(element, row, states, friction_signs.empty() ? 0 : friction_signs[e],
+                 states.Engaged(e));
     std::visit([&](const auto& law) { visit(law, row, at); }, element.law);
   }
 }
@@ -165,7 +256,7 @@ std::vector<VecX> RestingWrenches(const Mechanism& mechanism, const BodyStates& 
   if (friction_signs.empty()) return wrenches;
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     if (friction_signs[e] != 0 || !HasFriction(mechanism.elements[e])) continue;
-    double most = std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
+    double most = states.Engaged(e) * std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
     if (load_friction.size() > 0) most += load_friction[static_cast<Eigen::Index>(e)];
     wrenches.push_back(most *
                        GradientOf(ElementRow(mechanism, e, states), mechanism.bodies.size()));
@@ -213,12 +304,12 @@ namespace {
 constexpr int kMostPasses = 2000;
 constexpr double kSettled = 4.0 * kEps;
 
-double LoadOf(const LoadSystem& system, size_t e, const VecX& n) {
-  Vec3 p = system.p[e];
+double SizeIn(const LoadSystem& system, size_t e, const VecX& n) {
+  BearingLoad p = system.p[e];
   for (size_t d = 0; d < system.p.size(); ++d) {
     p -= system.P[e][d] * (system.sign[d] * system.per_load[d] * n[static_cast<Eigen::Index>(d)]);
   }
-  return p.norm();
+  return SizeOf(p);
 }
 
 }  // namespace
@@ -227,16 +318,85 @@ std::vector<size_t> LoadedElements(const Mechanism& mechanism) {
   std::vector<size_t> loaded;
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     const auto* friction = std::get_if<FrictionLaw>(&mechanism.elements[e].law);
-    if (friction != nullptr && friction->per_load() > 0.0) loaded.push_back(e);
+    if (friction != nullptr && friction->by_load()) loaded.push_back(e);
   }
   return loaded;
 }
 
-Vec3 AcrossAxis(const Mechanism& mechanism, size_t element, const MatX& reactions) {
-  const int j = mechanism.elements[element].joint;
-  const Vec3 a = mechanism.joints[static_cast<size_t>(j)].axis;
-  const Vec3 R = reactions.row(j).head<3>().transpose();
-  return R - a * a.dot(R);
+namespace {
+
+// Of a coordinate, in F: of universal joints the second one is on the child.
+Vec3 AxisOf(const Joint& joint, int coordinate, const BodyStates& states) {
+  if (joint.kind != JointKind::kUniversal || coordinate == 0) return joint.axis;
+  const auto p = static_cast<size_t>(joint.parent), c = static_cast<size_t>(joint.child);
+  const Mat3 R_WF = states.X_WB[p].linear() * joint.X_PF.linear();
+  return R_WF.transpose() * states.X_WB[c].linear() * joint.X_CM.linear() * joint.axis2;
+}
+
+// λ dP/dq of the coupling's row.
+double CouplingForce(const Mechanism& mechanism, size_t element, const BodyStates& states,
+                     int coupling, const MatX& reactions) {
+  const ForceElement& at = mechanism.elements[element];
+  const auto row = static_cast<Eigen::Index>(mechanism.joints.size()) + coupling;
+  double sum = 0.0;
+  for (const Coupling::Term& term : mechanism.couplings[static_cast<size_t>(coupling)].terms) {
+    if (term.joint != at.joint || term.coordinate != at.coordinate) continue;
+    const double q = ElementRow(mechanism, element, states).value;
+    for (size_t i = term.polynomial.size(); i-- > 0;) {
+      sum = sum * q + static_cast<double>(i + 1) * term.polynomial[i];
+    }
+  }
+  return sum * reactions(row, 0);
+}
+
+}  // namespace
+
+BearingLoad LoadOf(const Mechanism& mechanism, size_t element, const BodyStates& states,
+                   const MatX& reactions) {
+  const ForceElement& at = mechanism.elements[element];
+  const auto& law = std::get<FrictionLaw>(at.law);
+  const double radial = law.coefficient * law.radius / law.per_load();
+  BearingLoad load = BearingLoad::Zero();
+  if (law.coupling >= 0) {
+    load[6] = CouplingForce(mechanism, element, states, law.coupling, reactions);
+    return load;
+  }
+  const Joint& joint = mechanism.joints[static_cast<size_t>(at.joint)];
+  const Vec3 F = reactions.row(at.joint).head<3>().transpose();
+  const Vec3 M = reactions.row(at.joint).tail<3>().transpose();
+  if (IsOfBall(joint.kind, at.coordinate)) {
+    load.head<3>() = radial * F;
+    return load;
+  }
+  const Vec3 a = AxisOf(joint, at.coordinate, states);
+  const Vec3 across = F - a * a.dot(F);
+  if (std::isinf(law.length)) {
+    load.head<3>() = radial * across;
+  } else {
+    const Vec3 couple = M.cross(a) / law.length;
+    load.head<3>() = radial * (0.5 * across + couple);
+    load.segment<3>(3) = radial * (0.5 * across - couple);
+  }
+  load[6] = law.coefficient * law.thrust_radius / law.per_load() * a.dot(F);
+  return load;
+}
+
+double PerLoad(const Mechanism& mechanism, size_t element, const BodyStates& states) {
+  return states.Engaged(element) *
+         std::get<FrictionLaw>(mechanism.elements[element].law).per_load();
+}
+
+double SizeOf(const BearingLoad& load) {
+  return load.head<3>().norm() + load.segment<3>(3).norm() + load.tail<3>().norm();
+}
+
+BearingLoad SlopeOf(const BearingLoad& load) {
+  BearingLoad slope = BearingLoad::Zero();
+  for (const int k : {0, 3, 6}) {
+    const double norm = load.segment<3>(k).norm();
+    if (norm > 0.0) slope.segment<3>(k) = load.segment<3>(k) / norm;
+  }
+  return slope;
 }
 
 RunSummary LoadShared(const Mechanism& mechanism, size_t element) {
@@ -252,7 +412,7 @@ RunSummary LoadShared(const Mechanism& mechanism, size_t element) {
 double LoadSystem::Raised(size_t e) const {
   double sum = 0.0;
   for (size_t d = 0; d < P[e].size(); ++d) {
-    sum += P[e][d].norm() * std::abs(sign[d]) * per_load[d];
+    sum += SizeOf(P[e][d]) * std::abs(sign[d]) * per_load[d];
   }
   return sum;
 }
@@ -273,7 +433,7 @@ RunSummary LoadSystem::Solve(VecX* n) const {
   for (int pass = 0; q < 1.0 && pass < kMostPasses; ++pass) {
     const VecX last = *n;
     for (size_t e = 0; e < p.size(); ++e)
-      (*n)[static_cast<Eigen::Index>(e)] = LoadOf(*this, e, last);
+      (*n)[static_cast<Eigen::Index>(e)] = SizeIn(*this, e, last);
     if ((*n - last).cwiseAbs().maxCoeff() <= kSettled * n->maxCoeff()) return RunSummary::Done();
   }
   return {.stop = Stop::kSingular,

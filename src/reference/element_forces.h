@@ -4,6 +4,8 @@
 //   spring   F = −(F0 + Σ_i k_i x^i),  x = q − free           E = F0 x + Σ_i k_i x^(i+1)/(i+1)  (2)
 //   rotor    F = −J n² q̈                                      E = ½ J n² q̇²                     (3)
 //   friction F = −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇       P = F q̇ to the dampers           (4)
+//   stop     (1), (2) of StopLaw                              E = k δⁿ⁺¹/(n+1)
+//   curve    F(q) or F(q̇) by Hermite's polynomials            E = −∫ F dq of F(q)
 // A rotor about the axis a of a body that turns with ω and ε has the additional momentum h = J n q̇
 // a:
 //   M = −dh/dt = −J n (q̈ a + q̇ ω × a) on that body            E += J n q̇ a·ω                    (5)
@@ -60,39 +62,46 @@ struct ElementSlope {
 };
 [[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double q);
 
-// Friction that grows with the joint's own reaction. Internal to reference/.
+// Friction that grows with the joint's own reaction, or with a coupling's force. Internal to
+// reference/.
 //
-//   F_e = −μ_e r_e N_e sign q̇_e,  N_e = |R_e − a (a·R_e)|                                      (1)
-// R_e: force of the parent on the child through the joint, a: its axis; r = 1 in a guide. A journal
-// bears its radial load, a guide the force across it (its moments are not counted)
+//   F_e = −c_e n_e sign q̇_e,  S = c n by (1) of FrictionLaw, c = FrictionLaw::per_load()       (1)
 // [Shigley, Mechanical Engineering Design, "Boundary-lubricated bearings"].
 //
-// The reactions depend on the friction, linearly: with p_e = R_e − a (a·R_e) without friction by
-// load, and P_ed the part of it per unit of force F_d,
-//   n_e = |p_e − Σ_d P_ed sign q̇_d μ_d r_d n_d|                                                (2)
+// The reactions depend on the friction, linearly: with p_e the load without friction by load, and
+// P_ed the part of it per unit of force F_d,
+//   n_e = |p_e − Σ_d P_ed sign q̇_d c_d n_d|, |p|: the sum of the lengths of its three parts     (2)
 // which has one solution, and a fixed-point iteration that finds it, if
-//   q = max_e Σ_d |P_ed| μ_d r_d < 1                                                           (3)
+//   q = max_e Σ_d |P_ed| c_d < 1                                                               (3)
 
 /// Indices of the elements with friction by load.
 [[nodiscard]] std::vector<size_t> LoadedElements(const Mechanism& mechanism);
 
-/// Component across its joint's axis of the reaction force of an element's joint, F's axes, from
-/// `reactions` (joints × 6).
-[[nodiscard]] Vec3 AcrossAxis(const Mechanism& mechanism, size_t element, const MatX& reactions);
+/// What bears, in F's axes: the load of one bearing, that of the other, and the thrust, each as it
+/// rubs at the larger of their radii; or a coupling's force [N or N m].
+using BearingLoad = Eigen::Matrix<double, 9, 1>;
+/// Of an element, from FillReactions(). Linear in `reactions`.
+[[nodiscard]] BearingLoad LoadOf(const Mechanism& mechanism, size_t element,
+                                 const BodyStates& states, const MatX& reactions);
+/// The sum of the lengths of the three parts, and its gradient; of parts that are zero 0.
+[[nodiscard]] double SizeOf(const BearingLoad& load);
+[[nodiscard]] BearingLoad SlopeOf(const BearingLoad& load);
+/// FrictionLaw::per_load() of what is engaged.
+[[nodiscard]] double PerLoad(const Mechanism& mechanism, size_t element, const BodyStates& states);
 
 /// kUnsupported: redundant constraints share the load of an element's joint.
 [[nodiscard]] RunSummary LoadShared(const Mechanism& mechanism, size_t element);
 
 /// (2): all p and P of the loaded elements; `sign`: of their rates, 0 at rest.
 struct LoadSystem {
-  std::vector<Vec3> p;               ///< per loaded element [N]
-  std::vector<std::vector<Vec3>> P;  ///< [e][d]
+  std::vector<BearingLoad> p;               ///< per loaded element [N or N m]
+  std::vector<std::vector<BearingLoad>> P;  ///< [e][d]
   std::vector<double> sign, per_load;
 
   [[nodiscard]] double contraction() const;  ///< (3)
   /// The loaded element whose load the others raise most.
   [[nodiscard]] size_t MostRaised() const;
-  /// n_e [N]; kSingular where (3) does not hold, with q.
+  /// n_e [N or N m]; kSingular where (3) does not hold, with q.
   [[nodiscard]] RunSummary Solve(VecX* n) const;
 
  private:

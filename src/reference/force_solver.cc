@@ -310,7 +310,8 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
 int FillReactions(const Mechanism& mechanism, const BodyStates& states, const RowSet& rows,
                   const VecX& force, MatX* reactions) {
   const auto joints = static_cast<Eigen::Index>(mechanism.joints.size());
-  reactions->setZero(joints, 6);
+  const auto couplings = static_cast<Eigen::Index>(mechanism.couplings.size());
+  reactions->setZero(joints + couplings, 6);
   int row = 0;
   for (Eigen::Index j = 0; j < joints; ++j) {
     const Joint& joint = mechanism.joints[j];
@@ -331,7 +332,8 @@ int FillReactions(const Mechanism& mechanism, const BodyStates& states, const Ro
     const Vec3 moment = wrench.head<3>() - p_BoMo.cross(wrench.tail<3>());
     reactions->row(j) << (R_FW * wrench.tail<3>()).transpose(), (R_FW * moment).transpose();
   }
-  return row + static_cast<int>(mechanism.couplings.size());
+  for (Eigen::Index c = 0; c < couplings; ++c) (*reactions)(joints + c, 0) = force[row++];
+  return row;
 }
 
 void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
@@ -356,10 +358,8 @@ RunSummary ForceSolver::CheckLoadsUnique(const ReferenceSample& sample,
     for (int i = 0; i < rows_.size(); ++i) force[i] *= system_.RowScale(rows_.angular[i]);
     const MatX reactions = ReactionsOf(force, sample.states);
     for (const size_t e : loaded) {
-      if (AcrossAxis(mechanism_, e, reactions).norm() <= kOpens * force.cwiseAbs().maxCoeff()) {
-        continue;
-      }
-      return LoadShared(mechanism_, e);
+      const BearingLoad load = LoadOf(mechanism_, e, sample.states, reactions);
+      if (SizeOf(load) > kOpens * force.cwiseAbs().maxCoeff()) return LoadShared(mechanism_, e);
     }
   }
   return RunSummary::Done();
@@ -380,14 +380,14 @@ RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample) {
     const size_t e = loaded[d];
     LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()));
     unit.col(static_cast<Eigen::Index>(d)) = -force_;
-    system.p.push_back(AcrossAxis(mechanism_, e, reactions));
+    system.p.push_back(LoadOf(mechanism_, e, sample->states, reactions));
     system.sign.push_back(sample->friction_signs[e]);
-    system.per_load.push_back(std::get<FrictionLaw>(mechanism_.elements[e].law).per_load());
+    system.per_load.push_back(PerLoad(mechanism_, e, sample->states));
   }
   for (const size_t e : loaded) {
-    std::vector<Vec3>& row = system.P.emplace_back();
+    std::vector<BearingLoad>& row = system.P.emplace_back();
     for (Eigen::Index d = 0; d < unit.cols(); ++d) {
-      row.push_back(AcrossAxis(mechanism_, e, ReactionsOf(unit.col(d), sample->states)));
+      row.push_back(LoadOf(mechanism_, e, sample->states, ReactionsOf(unit.col(d), sample->states)));
     }
   }
   VecX n;

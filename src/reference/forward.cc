@@ -146,7 +146,7 @@ RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
     if (i > 0) summary = free.AdvanceTo(t_s);
     if (!summary.ok()) break;
     Complete(t_s, &free, &recorder, &sample);
-    internal::WriteSample(sample, columns, row);
+    internal::WriteSample(mechanism, sample, columns, row);
     run->trace.values.row(static_cast<Eigen::Index>(i)) = row;
     samples.push_back(sample.states);
   }

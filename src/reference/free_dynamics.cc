@@ -213,6 +213,7 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   FollowElements(mechanism_, states);
   FollowAngles(mechanism_, followed_, states);
   Factor(t_s, *states);
+  states->engaged = command_.engaged;
   if (!(pivot_ > kLost)) return Singular(t_s, *states);
   if (RunSummary summary = CheckDofs(t_s); !summary.ok()) return summary;
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
@@ -275,6 +276,7 @@ RunSummary FreeDynamics::AccelerateNear(double t_s, BodyStates* states) {
   FollowElements(mechanism_, states);
   FollowAngles(mechanism_, followed_, states);
   FillRows(t_s, *states);
+  states->engaged = command_.engaged;
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
   rates.tail(command_.acceleration.size()) += command_.acceleration;
   Unstack(VecX::Zero(size_), &states->A_WB);
@@ -334,8 +336,11 @@ void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const Mat
   rest_.d = held.gradients * A_p + held.bias;
   rest_.most.resize(held.gaps.size());
   for (size_t k = 0; k < phase_.held.size(); ++k) {
-    rest_.most[static_cast<Eigen::Index>(k)] =
-        std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway;
+    // Where it holds nothing, any force moves it.
+    rest_.most[static_cast<Eigen::Index>(k)] = std::max(
+        states.Engaged(phase_.held[k]) *
+            std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway,
+        std::numeric_limits<double>::min());
   }
 }
 

@@ -90,10 +90,8 @@ RunSummary FreeDynamics::CheckLoadsUnique(const ForceRows& at, const BodyStates&
     MatX reactions;
     (void)FillReactions(mechanism_, states, at.rows, force, &reactions);
     for (const size_t e : loaded_) {
-      if (AcrossAxis(mechanism_, e, reactions).norm() <= kBears * force.cwiseAbs().maxCoeff()) {
-        continue;
-      }
-      return LoadShared(mechanism_, e);
+      const BearingLoad load = LoadOf(mechanism_, e, states, reactions);
+      if (SizeOf(load) > kBears * force.cwiseAbs().maxCoeff()) return LoadShared(mechanism_, e);
     }
   }
   return RunSummary::Done();
@@ -124,13 +122,13 @@ LoadSystem FreeDynamics::LoadsAt(double t_s, const ForceRows& at, const BodyStat
     along->col(static_cast<Eigen::Index>(d)) = push.f = R.transpose() * gradient;
     const VecX a = phase_.held.empty() ? VecX(rest_.H.ldlt().solve(push.f)) : HeldMotion(push);
     unit.push_back(ReactionsBy(at, states, Momenta(mechanism_, states, R * a) - gradient));
-    system.p.push_back(AcrossAxis(mechanism_, e, without));
+    system.p.push_back(LoadOf(mechanism_, e, states, without));
     system.sign.push_back(sign[e]);
-    system.per_load.push_back(std::get<FrictionLaw>(mechanism_.elements[e].law).per_load());
+    system.per_load.push_back(PerLoad(mechanism_, e, states));
   }
   for (const size_t e : loaded_) {
-    std::vector<Vec3>& row = system.P.emplace_back();
-    for (const MatX& of : unit) row.push_back(AcrossAxis(mechanism_, e, of));
+    std::vector<BearingLoad>& row = system.P.emplace_back();
+    for (const MatX& of : unit) row.push_back(LoadOf(mechanism_, e, states, of));
   }
   return system;
 }
@@ -193,7 +191,8 @@ RunSummary FreeDynamics::FollowHeld(double t_s, const ForceRows& loops, const Bo
     const MatX reactions = ReactionsBy(loops, moved, wrenches);
     VecX next(n->size());
     for (size_t d = 0; d < loaded_.size(); ++d) {
-      next[static_cast<Eigen::Index>(d)] = AcrossAxis(mechanism_, loaded_[d], reactions).norm();
+      next[static_cast<Eigen::Index>(d)] =
+          SizeOf(LoadOf(mechanism_, loaded_[d], moved, reactions));
     }
     const double change = (next - *n).cwiseAbs().maxCoeff(), most = next.maxCoeff();
     *n = next;

@@ -151,6 +151,9 @@ RunSummary FreeMotion::BeginFriction() {
   phase.prescribed = PrescribedElements();
   std::erase_if(friction_elements_,
                 [&](size_t e) { return std::ranges::count(phase.prescribed, e) > 0; });
+  all_friction_ = friction_elements_;
+  off_ = SwitchedOff(motion_, 0.0, motion_.sample_s);
+  std::erase_if(friction_elements_, [&](size_t e) { return std::ranges::count(off_, e) > 0; });
   dynamics_.Factor(0.0, now_.states);
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
   for (const size_t e : friction_elements_) {
@@ -163,6 +166,43 @@ RunSummary FreeMotion::BeginFriction() {
   dynamics_.SetPhase(std::move(phase));
   if (!start.stops.empty()) {
     if (RunSummary summary = Settle(start, 0.0); !summary.ok()) return summary;
+  }
+  return dynamics_.Accelerate(now_.time_s, &now_.states);
+}
+
+RunSummary FreeMotion::SwitchFriction(double to_s) {
+  std::vector<size_t> off = SwitchedOff(motion_, now_.time_s, time_(to_s));
+  if (off == off_) return RunSummary::Done();
+  FrictionPhase phase = dynamics_.phase();
+  FrictionPhase next{.sign = phase.sign, .held = {}, .prescribed = phase.prescribed};
+  for (size_t k = 0; k < phase.held.size(); ++k) {
+    if (std::ranges::count(off, phase.held[k]) > 0) continue;
+    next.held.push_back(phase.held[k]);
+    next.at.push_back(phase.at[k]);
+  }
+  FrictionEvent event;
+  dynamics_.Factor(now_.time_s, now_.states);
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
+  friction_elements_.clear();
+  for (const size_t e : all_friction_) {
+    if (std::ranges::count(off, e) > 0) {
+      next.sign[e] = 0;
+      continue;
+    }
+    friction_elements_.push_back(e);
+    if (std::ranges::count(off_, e) == 0) continue;
+    if (Rests(e, rows[e])) {
+      event.stops.push_back(e);
+    } else {
+      next.sign[e] = RateOf(rows[e], now_.states.V_WB) > 0.0 ? 1 : -1;
+    }
+  }
+  off_ = std::move(off);
+  dynamics_.SetPhase(std::move(next));
+  events_s_.push_back(now_.time_s);
+  settled_here_ = 0;
+  if (!event.stops.empty()) {
+    if (RunSummary summary = Settle(event, 0.0); !summary.ok()) return summary;
   }
   return dynamics_.Accelerate(now_.time_s, &now_.states);
 }
@@ -224,7 +264,7 @@ std::optional<FreeMotion::FrictionEvent> FreeMotion::FirstEvent(const State& fro
 void FreeMotion::FindStops(const State& from, double h, const State& to, FrictionEvent* first) {
   BodyStates begin = now_.states, end = StatesOf(to);
   trouble_ = dynamics_.Accelerate(now_.time_s, &begin);
-  if (trouble_.ok()) trouble_ = dynamics_.Accelerate(now_.time_s + h, &end);
+  if (trouble_.ok()) trouble_ = dynamics_.Accelerate(time_(now_.time_s + h), &end);
   if (!trouble_.ok()) return;
   const std::vector<ScalarRow> at_begin = ElementRows(mechanism_, begin),
                                at_end = ElementRows(mechanism_, end);
@@ -263,7 +303,7 @@ void FreeMotion::FindStart(const State& from, double h, const State& to, Frictio
   const auto excess = [&](double after_s) {
     BodyStates states = StatesOf(StepFrom(from, after_s));
     if (!trouble_.ok()) return kNan;
-    trouble_ = dynamics_.Accelerate(now_.time_s + after_s, &states);
+    trouble_ = dynamics_.Accelerate(time_(now_.time_s + after_s), &states);
     return LoadRatio(dynamics_.rest()) - 1.0;
   };
   const double end = std::min(h, first->after_s);
@@ -280,7 +320,7 @@ void FreeMotion::FindStart(const State& from, double h, const State& to, Frictio
     VecX x, rates;
     way.Evaluate(after_s, &x, &rates);
     BodyStates states = StatesOf({x.begin(), x.end()});
-    trouble_ = dynamics_.Accelerate(now_.time_s + after_s, &states);
+    trouble_ = dynamics_.Accelerate(time_(now_.time_s + after_s), &states);
     return trouble_.ok() ? LoadRatio(dynamics_.rest()) - 1.0 : kNan;
   };
   std::array<double, kLoadLooks + 1> looks{};
@@ -461,7 +501,7 @@ RunSummary FreeMotion::DecideResting(const FrictionPhase& next, bool starts, dou
   }
   dynamics_.SetPhase(next);
   RunSummary trouble;
-  std::vector<int> sign = Starting(ahead_s, ahead, &trouble);
+  std::vector<int> sign = Starting(time_(ahead_s), ahead, &trouble);
   if (!trouble.ok()) return trouble;
   if (starts && std::ranges::all_of(sign, [](int s) { return s == 0; })) {
     VecX direction = VecX::Zero(static_cast<Eigen::Index>(sign.size()));

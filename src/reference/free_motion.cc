@@ -10,6 +10,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <utility>
 
 #include "mechanism/motion.h"
 #include "reference/closure_solver.h"
@@ -23,6 +24,7 @@ namespace {
 namespace odeint = boost::numeric::odeint;
 
 constexpr double kSmallestStepShare = 1e-10;  // of the duration
+constexpr double kCornerShare = 1e-10;        // of a step: how well a corner is found
 constexpr double kJump = 1e-6;                // a smaller share of a load is not a jump
 // Below this share of the largest pivot steps go half the way to the singular pose at most.
 constexpr double kApproach = 0.2;
@@ -124,11 +126,13 @@ FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double 
       dynamics_(mechanism, motion),
       stepper_(std::make_unique<Stepper>(tolerance)),
       breaks_(BreakTimes(motion)),
+      time_(motion),
       dt_(std::min({motion.sample_s, largest_step_s, 1e-3})),
       tolerance_(tolerance),
       fresh_(mechanism.elements.size(), 0) {
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     if (HasFriction(mechanism.elements[e])) friction_elements_.push_back(e);
+    if (HasCorners(mechanism.elements[e])) corner_elements_.push_back(e);
   }
   now_.states.Resize(mechanism.bodies.size());
   work_states_ = sampled_ = now_.states;
@@ -186,6 +190,7 @@ void FreeMotion::Rates(const State& x, State* rates, double t_s) {
   work_states_.coupled = now_.states.coupled;
   work_states_.turns = now_.states.turns;
   Unpack(x, &work_states_, nullptr);
+  t_s = time_(t_s);
   trouble_ = Accelerate(t_s, &work_states_);
   if (!trouble_.ok()) return;
   double* out = rates->data();
@@ -334,6 +339,10 @@ RunSummary FreeMotion::LookAhead() {
 
 // One smooth piece, or a bridge beyond its end.
 RunSummary FreeMotion::Segment(double to_s) {
+  time_.StartFrom(now_.time_s);
+  if (!motion_.switches.empty()) {
+    if (RunSummary summary = SwitchFriction(to_s); !summary.ok()) return summary;
+  }
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
   while (to_s - now_.time_s > 1e-14 * std::max(duration_s_, to_s)) {
     if (++tried_steps_ > effort_.most_steps) return TooManySteps();
@@ -360,11 +369,43 @@ RunSummary FreeMotion::Segment(double to_s) {
       return NoWayOn(dt_);
     }
     dt_ = clipped ? std::max(natural, dt) : dt;
-    if (to_the_end) t = to_s;
-    if (RunSummary summary = AcceptWithFriction(x, t, tried); !summary.ok()) return summary;
+    const double corner = corner_elements_.empty() ? tried : TimeToCorner(tried, x);
+    if (corner < tried) {
+      x = StepFrom(Pack(now_), corner);
+      if (!trouble_.ok()) return trouble_;
+      t = now_.time_s + corner;
+    } else if (to_the_end) {
+      t = to_s;
+    }
+    if (RunSummary summary = AcceptWithFriction(x, t, corner); !summary.ok()) return summary;
     if (tried < kSmallestStepShare * duration_s_ && !to_the_end) return NoWayOn(tried);
   }
   return RunSummary::Done();
+}
+
+std::vector<int> FreeMotion::PiecesAt(const State& x) const {
+  const BodyStates states = StatesOf(x);
+  std::vector<int> pieces;
+  for (const size_t e : corner_elements_) {
+    const ScalarRow row = ElementRow(mechanism_, e, states);
+    pieces.push_back(PieceOf(mechanism_.elements[e], row.value, RateOf(row, states.V_WB)));
+  }
+  return pieces;
+}
+
+// Where some law is on another piece after the step: the time just beyond the corner. A corner at
+// the very start is none.
+double FreeMotion::TimeToCorner(double h, const State& to) {
+  const State from = Pack(now_);
+  const std::vector<int> pieces = PiecesAt(from);
+  if (PiecesAt(to) == pieces) return h;
+  double before = 0.0, beyond = h;
+  while (beyond - before > kCornerShare * h) {
+    const double t = 0.5 * (before + beyond);
+    (PiecesAt(StepFrom(from, t)) == pieces ? before : beyond) = t;
+    if (!std::exchange(trouble_, RunSummary::Done()).ok()) return h;
+  }
+  return before == 0.0 || beyond < kSmallestStepShare * duration_s_ ? h : beyond;
 }
 
 RunSummary FreeMotion::AdvanceTo(double t_s) {
@@ -374,6 +415,12 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
     nodes_.clear();
   }
   if (RunSummary summary = Segment(t_s); !summary.ok()) return summary;
+  if (time_.IsJump(now_.time_s)) {  // a sample shows what follows
+    time_.StartFrom(now_.time_s);
+    RunSummary summary = SwitchFriction(now_.time_s + motion_.sample_s);
+    if (summary.ok()) summary = CheckFriction();
+    if (!summary.ok()) return summary;
+  }
   on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(duration_s_, t_s);
   if (on_bridge_) return SampleBridge(t_s);
   return Accelerate(now_.time_s, &now_.states);

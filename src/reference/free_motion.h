@@ -86,6 +86,9 @@ class FreeMotion {
   void Rates(const State& x, State* rates, double t_s);
   [[nodiscard]] RunSummary Segment(double to_s);
   [[nodiscard]] RunSummary Accept(const State& x, double t_s);
+  /// Of the laws with corners (PieceOf()), in the order of corner_elements_.
+  [[nodiscard]] std::vector<int> PiecesAt(const State& x) const;
+  [[nodiscard]] double TimeToCorner(double h, const State& to);
   [[nodiscard]] RunSummary SampleBridge(double t_s);
   /// Time to the singular pose ahead, if the weakest pivot goes on as between the last two nodes.
   [[nodiscard]] double TimeToSingular() const;
@@ -103,6 +106,8 @@ class FreeMotion {
     bool starts = false;
   };
   [[nodiscard]] RunSummary BeginFriction();
+  /// Brakes and clutches that are switched on or off from now until then.
+  [[nodiscard]] RunSummary SwitchFriction(double to_s);
   [[nodiscard]] RunSummary CheckFriction();
   [[nodiscard]] RunSummary AcceptWithFriction(const State& x, double t_s, double tried_s);
   [[nodiscard]] std::optional<FrictionEvent> FirstEvent(const State& from, double h,
@@ -154,6 +159,7 @@ class FreeMotion {
   std::vector<Vec3> start_W_;  ///< body origins at the start
   std::unique_ptr<Stepper> stepper_;
   std::vector<double> breaks_;
+  UntilJump time_;  ///< at which forces are evaluated
   std::deque<Node> nodes_;  ///< before now_, since the last break or bridge
   Node now_;
   std::optional<Bridge> bridge_;
@@ -168,7 +174,10 @@ class FreeMotion {
   double largest_pivot_ = 0.0;
   std::vector<SingularityCrossing> crossings_;
   const double tolerance_;
-  std::vector<size_t> friction_elements_;  ///< with dry friction
+  std::vector<size_t> friction_elements_;  ///< with dry friction that is not switched off
+  std::vector<size_t> all_friction_;       ///< with those that are
+  std::vector<size_t> off_;
+  std::vector<size_t> corner_elements_;
   std::vector<char> fresh_;                ///< per element: slides since this very time
   std::vector<double> events_s_;
   int settled_here_ = 0;  ///< how often friction was decided at this very time

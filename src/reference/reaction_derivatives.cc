@@ -134,7 +134,8 @@ void ForceVariations::FindUnique(const BodyStates& states, const std::vector<Row
       }
     }
     for (Loaded& at : *loaded) {
-      if (AcrossAxis(mechanism_, at.element, reactions).norm() > kStressShare) at.shared = true;
+      const BearingLoad load = LoadOf(mechanism_, at.element, states, reactions);
+      at.shared = at.shared || SizeOf(load) > kStressShare;
     }
   };
   for (Eigen::Index s = 0; s < self_stress_.cols(); ++s) {
@@ -152,7 +153,7 @@ void ForceVariations::FindUnique(const BodyStates& states, const std::vector<Row
 MatX ForceVariations::ReactionsOf(const BodyStates& states, const VecX& force) const {
   MatX reactions;
   (void)FillReactions(mechanism_, states, force_rows_, force, &reactions);
-  return reactions;
+  return reactions.topRows(static_cast<Eigen::Index>(mechanism_.joints.size()));
 }
 
 // FillReactions() takes the wrench on the body that moves to Mo and into F's axes.
@@ -203,9 +204,9 @@ std::vector<ForceVariations::Loaded> ForceVariations::LoadsOf(const BodyStates& 
   std::vector<Loaded> loaded;
   if (load_friction.size() == 0) return loaded;
   for (const size_t e : LoadedElements(mechanism_)) {
-    const double per_load = std::get<FrictionLaw>(mechanism_.elements[e].law).per_load();
     Loaded& at = loaded.emplace_back();
     at.element = e;
+    const double per_load = PerLoad(mechanism_, e, states);
     at.slope = signs[e] * per_load;
     at.load = load_friction[static_cast<Eigen::Index>(e)] / per_load;
     at.unit = SolveForces(GradientOf(ElementRow(mechanism_, e, states), mechanism_.bodies.size()));
@@ -235,13 +236,22 @@ RunSummary ForceVariations::DifferentiateAll(ClosureSolver* closure, const MatX&
   out->reactions.force = flat(reactions), out->acting.force = x.segment(first_acting_, acting);
   if (!slopes) return RunSummary::Done();
   for (Loaded& at : loaded) {
-    const Vec3 p = AcrossAxis(mechanism_, at.element, reactions);
-    if (!(p.norm() > kNoLoad * x.cwiseAbs().maxCoeff())) {
+    const ForceElement& element = mechanism_.elements[at.element];
+    if (std::get<FrictionLaw>(element.law).coupling >= 0 ||
+        (element.coordinate > 0 &&
+         mechanism_.joints[static_cast<size_t>(element.joint)].kind == JointKind::kUniversal)) {
+      return {.stop = Stop::kUnsupported,
+              .message = fmt::format("{} follows a coupling's force or an axis that turns with the "
+                                     "child: its derivatives are not computed",
+                                     Described(mechanism_, element))};
+    }
+    const BearingLoad p = LoadOf(mechanism_, at.element, states, reactions);
+    if (!(SizeOf(p) > kNoLoad * x.cwiseAbs().maxCoeff())) {
       return {.stop = Stop::kUnsupported,
               .message = fmt::format("{} bears no load: its friction has a kink there",
                                      Described(mechanism_, mechanism_.elements[at.element]))};
     }
-    at.direction = p.normalized();
+    at.direction = SlopeOf(p);
   }
 
   // (6): with u_d the forces of a unit along each friction, δx = y + Σ_d s_d μ_d δn_d u_d.
@@ -251,7 +261,7 @@ RunSummary ForceVariations::DifferentiateAll(ClosureSolver* closure, const MatX&
   }
   const auto many = static_cast<Eigen::Index>(loaded.size());
   const auto load_of = [&](size_t d, const MatX& of) {
-    return loaded[d].direction.dot(AcrossAxis(mechanism_, loaded[d].element, of));
+    return loaded[d].direction.dot(LoadOf(mechanism_, loaded[d].element, states, of));
   };
   MatX N = MatX::Identity(many, many);
   for (size_t d = 0; d < loaded.size(); ++d) {

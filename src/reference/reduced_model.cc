@@ -157,7 +157,7 @@ MatX ReducedModel::MassMatrix(const MatX& T) const {
 
 const ForceElement* ReducedModel::friction_by_load() const {
   for (const ForceElement& element : impl_->mechanism.elements) {
-    if (HasFriction(element) && std::get<FrictionLaw>(element.law).per_load() > 0.0) {
+    if (HasFriction(element) && std::get<FrictionLaw>(element.law).by_load()) {
       return &element;
     }
   }

@@ -38,6 +38,7 @@ RunSummary ReferenceSolver::Kinematics(const CommandSample& command, ReferenceSa
 
 RunSummary ReferenceSolver::Dynamics(const CommandSample& command, ReferenceSample* sample) {
   if (RunSummary summary = Kinematics(command, sample); !summary.ok()) return summary;
+  sample->states.engaged = command.engaged;
   RunSummary summary = impl_->forces.Solve(command.loads, sample, &impl_->closure);
   if (!summary.ok()) {
     summary.time_s = command.time_s;
@@ -66,7 +67,7 @@ ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
     if (commands) commands(i, &command);
     run.summary = solver.Dynamics(command, &sample);
     if (!run.summary.ok()) break;
-    internal::WriteSample(sample, columns, row);
+    internal::WriteSample(mechanism, sample, columns, row);
     run.trace.values.row(static_cast<Eigen::Index>(i)) = row;
   }
   time.StopInto(&run.summary);

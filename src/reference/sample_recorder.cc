@@ -114,14 +114,14 @@ void WriteBands(const ReferenceSample& sample, const ChannelColumns& columns,
 
 }  // namespace
 
-void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
+void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample, const ChannelColumns& columns,
                  Eigen::Ref<Eigen::RowVectorXd> row) {
   const auto put = [&](Quantity quantity, Eigen::Index k, double value) {
     row[columns(quantity, static_cast<size_t>(k))] = value;
   };
   // Six components per subject.
-  const auto put_rows = [&](Quantity quantity, const MatX& table) {
-    for (Eigen::Index i = 0; i < table.rows(); ++i) {
+  const auto put_rows = [&](Quantity quantity, const MatX& table, size_t rows) {
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows); ++i) {
       for (Eigen::Index c = 0; c < 6; ++c) put(quantity, 6 * i + c, table(i, c));
     }
   };
@@ -131,7 +131,7 @@ void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
     put(Quantity::kAcceleration, d, sample.driven.acceleration[d]);
     put(Quantity::kForce, d, sample.drive_force[d]);
   }
-  put_rows(Quantity::kPose, sample.outputs);
+  put_rows(Quantity::kPose, sample.outputs, mechanism.outputs.size());
   for (Eigen::Index k = 0; k < sample.joints.position.size(); ++k) {
     put(Quantity::kJointPosition, k, sample.joints.position[k]);
     put(Quantity::kJointVelocity, k, sample.joints.velocity[k]);
@@ -143,7 +143,9 @@ void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
   if (columns.Has(Quantity::kForceBand) || columns.Has(Quantity::kBaseForceBand)) {
     WriteBands(sample, columns, row);
   }
-  if (columns.Has(Quantity::kReaction)) put_rows(Quantity::kReaction, sample.reactions);
+  if (columns.Has(Quantity::kReaction)) {
+    put_rows(Quantity::kReaction, sample.reactions, mechanism.joints.size());
+  }
   put(Quantity::kLoopGap, 0, sample.closure_position_m);
   put(Quantity::kLoopTwist, 0, sample.closure_rotation_rad);
   put(Quantity::kInputPower, 0, sample.power.input);

@@ -40,7 +40,8 @@ constexpr double kMostTableSteps = 2e5;  // no smaller step is taken than that g
 const std::vector<std::string> kMotionScenarioKeys = {
     "kind",      "mechanism", "description", "parameters", "gravity",    "motion",
     "loads",     "forces",    "analytic",    "reference",  "simulation", "checks",
-    "snapshots", "expect",    "witnesses",   "figures",    "contacts",   "phases"};
+    "snapshots", "expect",    "witnesses",   "figures",    "contacts",   "phases",
+    "switches"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -120,8 +121,12 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     const MotionTimes times = ReadTable(map.Find("reference"));
     const YamlNode* motion = map.Required("motion");
     if (motion == nullptr) return;
-    scenario_.motion = ReadMotion(&values_, *mechanism_, motion, map.Find("loads"),
-                                  map.Find("forces"), times, PhaseMotionOf(), &table_findings_);
+    scenario_.motion = ReadMotion(&values_, *mechanism_,
+                                  {.motion = motion,
+                                   .loads = map.Find("loads"),
+                                   .forces = map.Find("forces"),
+                                   .switches = map.Find("switches")},
+                                  times, PhaseMotionOf(), &table_findings_);
     ResolveTables(*motion, map.Find("simulation"));
     FitStep(map.Find("simulation"));
     scenario_.snapshots =
@@ -180,7 +185,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
       yaml_.Error(node, "phases is empty", "phases: [{until_s: 0.5, contacts: [left]}, …]");
       return false;
     }
-    for (const char* key : {"contacts", "forces"}) {
+    for (const char* key : {"contacts", "forces", "switches"}) {
       const YamlNode* other = map.Find(key);
       if (other == nullptr) continue;
       yaml_.Error(*other, fmt::format("{} and phases are not taken together", key),

@@ -88,6 +88,7 @@ class FreeMotionReader {
       const ProfileContext context{.unit = ForceUnit(mechanism_, mechanism_.drives[drive]),
                                    .home = {},
                                    .name = "forces." + entry.key,
+                                   .may_jump = true,
                                    .tables = tables_};
       motion_->forces.push_back(
           {drive, ReadProfile(values_, *entry.value, "forces." + entry.key, context)});
@@ -407,7 +408,8 @@ class MotionReader {
         known_(NamedMotionCoordinates(mechanism)),
         tables_{.mechanism = &mechanism, .files = files} {}
 
-  Motion Read(const YamlNode* node, const YamlNode* loads, const YamlNode* forces) {
+  Motion Read(const MotionSections& sections) {
+    const YamlNode *node = sections.motion, *forces = sections.forces;
     YamlMap map(&yaml(), node, "motion",
                 {"duration_s", "sample_s", "commands", "equal", "path", "pose_table", "initial",
                  "initial_rates"});
@@ -418,7 +420,11 @@ class MotionReader {
     double path_end_s = kNan;
     if (const YamlNode* path = map.Find("path")) path_end_s = ReadPath(*path);
     ReadTimes(map, path_end_s);
-    if (loads != nullptr) ReadLoads(*loads);
+    if (sections.loads != nullptr) ReadLoads(*sections.loads);
+    if (sections.switches != nullptr) {
+      ReadSwitches(*sections.switches);
+      CheckShares(*sections.switches);
+    }
     if (map.valid() && node != nullptr && IsFree(node, forces)) {
       ReadFreeMotion(values_, mechanism_, *node, forces, &tables_, &motion_);
     } else if (map.valid() && motion_.commands.empty() && !yaml().has_errors() && node != nullptr) {
@@ -724,6 +730,53 @@ class MotionReader {
     return t;
   }
 
+  // Brakes and clutches: elements that act with a share of their force.
+  void ReadSwitches(const YamlNode& node) {
+    std::vector<std::string> names;
+    for (const ForceElement& element : mechanism_.elements) names.push_back(element.name);
+    for (const YamlEntry& entry : yaml().Entries(node, "switches")) {
+      const std::string path = "switches." + entry.key;
+      const size_t before = motion_.switches.size();
+      const Profile share = ReadProfile(
+          values_, *entry.value, path,
+          {.unit = "1", .home = {}, .name = path, .may_jump = true, .tables = &tables_});
+      for (size_t e = 0; e < names.size(); ++e) {
+        const ForceElement& element = mechanism_.elements[e];
+        const bool axis = ActsOnBall(mechanism_, element) && names[e].size() > 2 &&
+                          names[e].substr(0, names[e].size() - 2) == entry.key;
+        if (names[e] != entry.key && !axis) continue;
+        const auto* curve = std::get_if<CurveLaw>(&element.law);
+        if (!std::holds_alternative<FrictionLaw>(element.law) &&
+            (curve == nullptr || !curve->of_rate)) {
+          yaml().Error(entry,
+                       fmt::format("{}: a {} stores energy or is MuJoCo's own, and is not switched",
+                                   path, Described(mechanism_, element)),
+                       "dry friction and curves of the rate are");
+          return;
+        }
+        motion_.switches.push_back({entry.key, e, share});
+      }
+      if (motion_.switches.size() > before) continue;
+      yaml().Error(entry,
+                   fmt::format("switches: {} has no element '{}'", mechanism_.name, entry.key),
+                   DidYouMean(entry.key, names, "known: " + Joined(names, kMostNames)));
+    }
+  }
+
+  // A share below zero would push: looked at where profiles begin, end and turn, and between.
+  void CheckShares(const YamlNode& node) {
+    constexpr int kLooks = 1000;
+    for (const Switch& one : motion_.switches) {
+      for (int k = 0; k <= kLooks; ++k) {
+        const double t_s = motion_.duration_s * k / kLooks, share = Evaluate(one.share, t_s).value;
+        if (share >= 0.0) continue;
+        yaml().Error(node, fmt::format("switches.{} = {:.3g} at t = {:.3g} s violates share >= 0",
+                                       one.name, share, t_s));
+        break;
+      }
+    }
+  }
+
   void ReadLoads(const YamlNode& node) {
     for (const YamlEntry& entry : yaml().Entries(node, "loads")) {
       const std::string path = "loads." + entry.key;
@@ -761,7 +814,11 @@ class MotionReader {
       }
       Profile& profile = first == 0 ? load->force[i] : load->moment[i];
       profile = ReadProfile(values_, *(*items)[i], name,
-                            {.unit = unit, .home = {}, .name = name, .tables = &tables_});
+                            {.unit = unit,
+                             .home = {},
+                             .name = name,
+                             .may_jump = true,
+                             .tables = &tables_});
     }
   }
 
@@ -806,10 +863,9 @@ class MotionReader {
 
 }  // namespace
 
-Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,
-                  const YamlNode* loads, const YamlNode* forces, const MotionTimes& otherwise,
-                  const PhaseMotion& phase, Diagnostics* files) {
-  return MotionReader(values, mechanism, otherwise, phase, files).Read(motion, loads, forces);
+Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const MotionSections& sections,
+                  const MotionTimes& otherwise, const PhaseMotion& phase, Diagnostics* files) {
+  return MotionReader(values, mechanism, otherwise, phase, files).Read(sections);
 }
 
 }  // namespace mbv

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "math/profile.h"
 #include "scenario/tables/motion_table.h"
@@ -44,6 +46,7 @@ class ProfileReader : AmountReader {
     std::vector<std::string> keys = {"value",     "value_deg", "value_mm", "sine", "ramp",  "bump",
                                      "trapezoid", "s_curve",   "fourier",  "via",  "table", "cam"};
     keys.insert(keys.end(), StepLaws().begin(), StepLaws().end());
+    if (context_.may_jump) keys.insert(keys.end(), {"step", "pulse"});
     YamlMap map(&values_->yaml(), &node, path, keys);
     if (!map.valid()) return;
     if (node.entries.size() != 1) {
@@ -62,10 +65,16 @@ class ProfileReader : AmountReader {
     } else if (key == "sine") {
       ReadSine(value, term_path, profile);
     } else if (key == "ramp") {
-      YamlMap term = Map(value, term_path, "rate", {});
-      if (const auto rate = RequiredAmount(term, "rate")) {
-        profile->terms.emplace_back(RampTerm{*rate});
+      ReadRamp(*value, term_path, profile);
+    } else if (key == "step") {
+      YamlMap term = Map(value, term_path, "height", {"at_s"});
+      const auto height = RequiredAmount(term, "height");
+      const auto at_s = values_->InUnit(term, "at_s", {kPlain});
+      if (term.Required("at_s") != nullptr && height && at_s) {
+        profile->terms.emplace_back(JumpTerm{*at_s, *height});
       }
+    } else if (key == "pulse") {
+      ReadPulse(value, term_path, profile);
     } else if (key == "trapezoid" || key == "s_curve") {
       ReadLimited(key == "s_curve", value, term_path, profile);
     } else if (key == "fourier") {
@@ -89,6 +98,60 @@ class ProfileReader : AmountReader {
     const std::vector<double> breaks = BreakTimes({{profile.terms.back()}});
     if (breaks.empty()) return;
     context_.tables->laws.push_back({&node, path, breaks.front(), breaks.back()});
+  }
+
+  // Without an end, or, of a force, between two times.
+  void ReadRamp(const YamlNode& node, const std::string& path, Profile* profile) {
+    std::vector<std::string> keys;
+    if (context_.may_jump) keys = {"start_s", "duration_s"};
+    YamlMap term = Map(&node, path, "rate", keys);
+    const auto rate = RequiredAmount(term, "rate");
+    if (!rate) return;
+    if (!term.Has("start_s") && !term.Has("duration_s")) {
+      profile->terms.emplace_back(RampTerm{*rate});
+      return;
+    }
+    const auto duration_s = values_->RequiredPositive(term, "duration_s");
+    const double start_s = values_->InUnit(term, "start_s", {kPlain}).value_or(0.0);
+    if (!duration_s) return;
+    auto ramp = std::make_shared<Piecewise>();
+    ramp->knots = ramp->breaks = {start_s, start_s + *duration_s};
+    ramp->coefficients = {{0.0, *rate}};
+    profile->terms.emplace_back(PiecewiseTerm{std::move(ramp)});
+  }
+
+  void ReadPulse(const YamlNode* node, const std::string& path, Profile* profile) {
+    constexpr int kMostPulses = 10000;
+    YamlMap term = Map(node, path, "height", {"start_s", "duration_s", "period_s", "count"});
+    if (!term.valid()) return;
+    const auto height = RequiredAmount(term, "height");
+    const auto duration_s = values_->RequiredPositive(term, "duration_s");
+    const double start_s = values_->InUnit(term, "start_s", {kPlain}).value_or(0.0);
+    std::optional<double> period_s = 0.0;
+    std::optional<int> count = 1;
+    if (const YamlNode* many = term.Find("count")) {
+      count = values_->yaml().Integer(*many, term.PathOf("count"));
+      period_s = values_->RequiredPositive(term, "period_s");
+      if (count && (*count < 1 || *count > kMostPulses)) {
+        values_->yaml().Error(*many, fmt::format("{} = {} violates 1 <= count <= {}",
+                                                 term.PathOf("count"), *count, kMostPulses));
+        return;
+      }
+    } else if (const YamlNode* period = term.Find("period_s")) {
+      values_->yaml().Error(*period, fmt::format("{} needs count as well", term.PathOf("period_s")));
+      return;
+    }
+    if (!height || !duration_s || !period_s || !count) return;
+    if (*count > 1 && *period_s <= *duration_s) {
+      values_->yaml().Error(*node, fmt::format("{}: period_s = {} violates period_s > duration_s = {}",
+                                               path, *period_s, *duration_s));
+      return;
+    }
+    for (int k = 0; k < *count; ++k) {
+      const double from_s = start_s + k * *period_s;
+      profile->terms.emplace_back(JumpTerm{from_s, *height});
+      profile->terms.emplace_back(JumpTerm{from_s + *duration_s, -*height});
+    }
   }
 
   void ReadSine(const YamlNode* node, const std::string& path, Profile* profile) {

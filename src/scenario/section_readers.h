@@ -51,11 +51,16 @@ struct PhaseMotion {
   const Mechanism* first = nullptr;    ///< PhaseStart::first
 };
 
-/// Reads the sections against a mechanism, with the tables that profiles name. Findings go to the
-/// reader, those about tables' files to `files`; the motion is complete only if there was no error.
+/// Sections of a scenario about motion; null: left out.
+struct MotionSections {
+  const YamlNode *motion = nullptr, *loads = nullptr, *forces = nullptr, *switches = nullptr;
+};
+
+/// Reads the sections (`motion` is there) against a mechanism, with the tables that profiles name.
+/// Findings go to the reader, those about tables' files to `files`; the motion is complete only if
+/// there was no error.
 [[nodiscard]] Motion ReadMotion(ValueReader* values, const Mechanism& mechanism,
-                                const YamlNode* motion, const YamlNode* loads,
-                                const YamlNode* forces, const MotionTimes& otherwise,
+                                const MotionSections& sections, const MotionTimes& otherwise,
                                 const PhaseMotion& phase, Diagnostics* files);
 
 // The sections of a scenario file that do not concern motion.
@@ -122,6 +127,7 @@ struct ProfileContext {
   std::optional<double> home;  ///< value of the word `home`; empty where it has no meaning
   std::string name = {};       ///< of what it is for: "crank.drive"
   bool moves = false;          ///< of a command: its derivatives count
+  bool may_jump = false;       ///< of a force: it may jump, and its rate, too
   ProfileTables* tables = nullptr;  ///< null where a table has no meaning
 };
 

@@ -56,6 +56,9 @@ class ForeignRunner {
 
  private:
   [[nodiscard]] std::string WhyNotAsked() const {
+    if (!motion_.switches.empty() || !JumpTimes(motion_).empty()) {
+      return "switched elements and forces that jump are not handed to foreign witnesses";
+    }
     for (const Load& load : motion_.loads) {
       if (!load.following.empty()) {
         return "loads that are expressions of the state are not handed to foreign witnesses";

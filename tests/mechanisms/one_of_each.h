@@ -34,7 +34,7 @@ inline void AddOneOfEach(Mechanism* m) {
                            .joint = static_cast<int>(j),
                            .coordinate = c,
                            .law = DampingLaw{.damping = 0.3}};
-      switch (count++ % 5) {
+      switch (count++ % 7) {
         case 1:
           element.law = SpringLaw{.polynomial = {9.0, 5.0, 40.0}, .free = 0.1, .preload = 0.7};
           break;
@@ -49,6 +49,18 @@ inline void AddOneOfEach(Mechanism* m) {
         case 4:
           element.law = FrictionLaw{.coulomb = 0.7, .breakaway = 0.9, .stribeck_rate = 0.2};
           break;
+        case 5:  // in touch at home
+          element.law = StopLaw{.lower = m->joints[j].home[static_cast<size_t>(c)] + 0.3,
+                                .stiffness = 20.0,
+                                .exponent = 1.5,
+                                .dissipation = 0.1};
+          break;
+        case 6:
+          element.law = CurveLaw{.of_rate = c > 0,
+                                 .knots = {{-4.0, 3.0, 0.0, -0.4},
+                                           {0.3, 0.5, -1.0, -1.0},
+                                           {5.0, -2.0, -0.5, 0.0}}};
+          break;
         default:
           break;
       }
@@ -56,6 +68,8 @@ inline void AddOneOfEach(Mechanism* m) {
       // A ball's position is none, and a rotor on it has no carrier.
       const auto* rotor = std::get_if<RotorLaw>(&element.law);
       if (ball && (std::holds_alternative<SpringLaw>(element.law) ||
+                   std::holds_alternative<StopLaw>(element.law) ||
+                   std::holds_alternative<CurveLaw>(element.law) ||
                    (rotor != nullptr && rotor->carrier))) {
         element.law = DampingLaw{.damping = 0.2};
       }
@@ -73,6 +87,9 @@ inline void AddOneOfEach(Mechanism* m) {
   line.p_to = Vec3(0.01, 0.02, 0.03);
   line.stiffness = 50.0, line.free_length_m = 0.4, line.damping = 3.0;
   m->springs.push_back(line);
+  m->elements.push_back({.name = "buffer",
+                         .spring = static_cast<int>(m->springs.size()) - 1,
+                         .law = StopLaw{.upper = 0.5, .stiffness = 30.0, .damping = 0.4}});
   if (m->bodies.size() > 2) {
     Bushing bushing;
     bushing.name = "bush", bushing.parent = 1, bushing.child = last;

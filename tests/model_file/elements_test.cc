@@ -1,7 +1,11 @@
 // `elements` of model files: read, refused, written.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "model_file/element_text.h"
 #include "model_file/load_model.h"
@@ -130,15 +134,28 @@ TEST(Elements, WhatMeansNothingIsAFinding) {
 
 TEST(Elements, FrictionByLoadNeedsAJournalOrAGuide) {
   const std::string radius =
-      "  hint: radius: of the journal of a revolute joint whose friction is coefficient times "
-      "radius times its radial load\n";
+      "  hint: radius: of the journal or ball of a joint whose friction is coefficient times radius "
+      "times its load\n";
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coefficient: 0.2}\n"),
             "m.yaml:10:6: error: elements.g needs a radius\n" + radius);
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coulomb: 1, radius: 0.2}\n"),
             "m.yaml:10:56: error: elements.g.radius has no meaning here\n" + radius);
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: slide, coefficient: 0.2, radius: 1}\n"),
-            "m.yaml:10:50: error: elements.g.coefficient: friction by the joint's load is known of "
-            "revolute and prismatic joints only\n  hint: coulomb: friction whatever the load\n");
+            "m.yaml:10:58: error: elements.g.radius has no meaning here\n" + radius);
+  EXPECT_EQ(ElementFindings("  g: {kind: friction, drive: leg, coefficient: 0.2, radius: 1}\n"),
+            "m.yaml:10:48: error: elements.g.coefficient: friction by the joint's load is known of "
+            "revolute, prismatic, cylindrical, universal and spherical joints only\n"
+            "  hint: coulomb: friction whatever the load\n");
+  const auto finds = [](const std::string& element, const std::string& words) {
+    const std::string text = ElementFindings("  g: {kind: friction, " + element + "}\n");
+    EXPECT_NE(text.find(words), std::string::npos) << element << "\n" << text;
+  };
+  finds("joint: slide, coordinate: 1, coefficient: 0.2, thrust_radius: 1", "no meaning here");
+  finds("joint: turn, coulomb: 0.2, length: 1", "length has no meaning here");
+  finds("joint: turn, coefficient: 0.2, radius: 1, length: 0", "length > 0");
+  finds("joint: turn, coupling: gear, efficiency: 0.9", "there is no such coupling");
+  finds("joint: turn, efficiency: 0.9", "coupling");
+  finds("joint: turn, coupling: gear, efficiency: 0.9, radius: 1", "no meaning with a coupling");
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coefficient: -1, radius: 1}\n"),
             "m.yaml:10:49: error: elements.g.coefficient = -1 violates coefficient >= 0\n");
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coefficient: 1, radius: 0}\n"),
@@ -177,6 +194,122 @@ std::string WithCarried(const std::string& elements) {
   const std::string slide = "parent: world, child: b";
   text.replace(text.find(slide), slide.size(), "parent: a, child: b");
   return text;
+}
+
+TEST(GearLosses, FollowACouplingOfTheirCoordinate) {
+  const auto with = [](const std::string& element) {
+    return LoadModelText(WithElements("  g: {kind: friction, " + element + "}\n") +
+                             "couplings: {gear: {joint: slide, coordinate: 1, follows: turn, ratio: "
+                             "-1/5}}\n",
+                         "m.yaml");
+  };
+  const LoadResult loaded = with("joint: turn, coupling: gear, efficiency: 0.8");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const auto& law = LawOf<FrictionLaw>(*loaded.mechanism, 0);
+  EXPECT_EQ(law.coupling, 0);
+  EXPECT_DOUBLE_EQ(law.coefficient, 0.25);
+  const LoadResult again = LoadModelText(WriteModel(*loaded.mechanism), "m.yaml");
+  ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
+  EXPECT_EQ(WriteModel(*again.mechanism), WriteModel(*loaded.mechanism));
+  const auto finds = [&](const std::string& element, const std::string& words) {
+    const std::string text = with(element).diagnostics.Text();
+    EXPECT_NE(text.find(words), std::string::npos) << element << "\n" << text;
+  };
+  finds("joint: slide, coupling: gear, efficiency: 0.8", "does not couple the coordinate");
+  finds("joint: turn, coupling: gear", "needs either efficiency or coefficient");
+  finds("joint: turn, coupling: gear, efficiency: 1.2", "efficiency <= 1");
+  finds("joint: turn, coupling: gear, efficiency: 0", "efficiency > 0");
+}
+
+TEST(StopsAndCurves, AreReadWrittenAndReadAgain) {
+  const std::string lines =
+      "  end: {kind: stop, joint: slide, lower_mm: -50, upper: 0.12, stiffness_per_mm: 20,"
+      " exponent: 1.5, dissipation: 0.2}\n"
+      "  pad: {kind: stop, drive: m, upper_deg: 90, stiffness: 5, damping_per_deg: 0.1}\n"
+      "  gas: {kind: curve, from: a, to: b.p, points_mm: [[200, 400], [400, 300]], beyond: held}\n"
+      "  oil: {kind: curve, spring: gas, of: rate, points: [[-1, 900], [0, 0], [2, -300]],"
+      " interpolation: linear, beyond: linear}\n"
+      "  fan: {kind: curve, joint: turn, of: rate, points_rpm: [[0, 0], [60, -2], [120, -8]],"
+      " beyond: linear}\n"
+      "  J: {kind: rotor, joint: turn, inertia_kgcm2: 3}\n";
+  const LoadResult loaded = LoadModelText(WithElements(lines), "m.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ASSERT_EQ(m.elements.size(), 6u);
+  const auto& end = LawOf<StopLaw>(m, 0);
+  EXPECT_EQ(end.lower, -0.05);
+  EXPECT_EQ(end.upper, 0.12);
+  EXPECT_EQ(end.stiffness, 20e3);
+  EXPECT_EQ(end.exponent, 1.5);
+  EXPECT_EQ(end.dissipation, 0.2);
+  const auto& pad = LawOf<StopLaw>(m, 1);
+  EXPECT_TRUE(std::isinf(pad.lower));
+  EXPECT_DOUBLE_EQ(pad.upper, std::numbers::pi / 2);
+  EXPECT_DOUBLE_EQ(pad.damping, 18.0 / std::numbers::pi);
+  // Between two points: along a spring without stiffness.
+  ASSERT_EQ(m.springs.size(), 1u);
+  EXPECT_EQ(m.springs[0].stiffness, 0.0);
+  EXPECT_EQ(m.springs[0].p_to, Vec3(0.5, 0, 0));
+  EXPECT_EQ(m.elements[2].spring, 0);
+  EXPECT_EQ(m.elements[3].spring, 0);
+  EXPECT_EQ(Described(m, m.elements[3]), "curve along 'gas'");
+  EXPECT_TRUE(ActsOnLength(m, m.elements[2]));
+  const auto& gas = LawOf<CurveLaw>(m, 2);
+  EXPECT_FALSE(gas.of_rate);
+  EXPECT_EQ(gas.knots[1].at, 0.4);
+  EXPECT_DOUBLE_EQ(gas.knots[0].slope_after, -500.0);
+  EXPECT_EQ(gas.knots[0].slope_before, 0.0);
+  const auto& oil = LawOf<CurveLaw>(m, 3);
+  EXPECT_TRUE(oil.of_rate);
+  EXPECT_EQ(oil.knots[1].slope_before, -900.0);
+  EXPECT_EQ(oil.knots[1].slope_after, -150.0);
+  EXPECT_EQ(oil.knots[0].slope_before, -900.0);
+  // Of three points at equal distances: the harmonic mean of the secants between.
+  const auto& fan = LawOf<CurveLaw>(m, 4);
+  const double unit = 2.0 * std::numbers::pi;
+  EXPECT_DOUBLE_EQ(fan.knots[1].slope_after, -2.0 * 2.0 * 6.0 / (2.0 + 6.0) / unit);
+  EXPECT_DOUBLE_EQ(fan.knots[2].slope_before, -8.0 / unit);
+  EXPECT_EQ(fan.knots[0].slope_before, 0.0);
+  EXPECT_DOUBLE_EQ(LawOf<RotorLaw>(m, 5).inertia, 3e-4);
+  const LoadResult again = LoadModelText(WriteModel(m), "m.yaml");
+  ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
+  EXPECT_EQ(WriteModel(*again.mechanism), WriteModel(m));
+  EXPECT_EQ(again.mechanism->elements[3].spring, 0);
+  EXPECT_EQ(LawOf<CurveLaw>(*again.mechanism, 4).knots[1].slope_after, fan.knots[1].slope_after);
+}
+
+TEST(StopsAndCurves, WhatMeansNothingIsAFinding) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"{kind: stop, joint: turn, stiffness: 5}", "needs lower, upper, or both"},
+      {"{kind: stop, joint: turn, upper: 1}", "stiffness"},
+      {"{kind: stop, joint: turn, upper: 1, stiffness: 0}", "stops nothing"},
+      {"{kind: stop, joint: turn, lower: 2, upper: 1, stiffness: 5}", "violates lower < upper"},
+      {"{kind: stop, joint: turn, upper_mm: 2, stiffness: 5}", "is an angle"},
+      {"{kind: stop, joint: turn, upper: 2, stiffness_per_mm: 5}", "is an angle"},
+      {"{kind: stop, joint: turn, upper: 2, stiffness: 5, exponent: 0.5}", "exponent >= 1"},
+      {"{kind: stop, joint: turn, upper: 2, stiffness: 5, damping: 1, dissipation: 1}", "both"},
+      {"{kind: stop, joint: turn, drive: m, upper: 2, stiffness: 5}", "needs one of joint, drive"},
+      {"{kind: stop, from: a, upper: 2, stiffness: 5}", "to"},
+      {"{kind: stop, spring: gas, upper: 2, stiffness: 5}", "no such spring"},
+      {"{kind: curve, joint: turn, points: [[0, 0], [1, 1]]}", "beyond"},
+      {"{kind: curve, joint: turn, beyond: held}", "points"},
+      {"{kind: curve, joint: turn, points: [[0, 0]], beyond: held}", "fewer than two points"},
+      {"{kind: curve, joint: turn, points: [[0, 0], [0, 1]], beyond: held}", "increasing"},
+      {"{kind: curve, joint: turn, points: [[0, 0], [1]], beyond: held}", "a list of 2"},
+      {"{kind: curve, joint: turn, points_mm: [[0, 0], [1, 1]], beyond: held}", "not in that unit"},
+      {"{kind: curve, joint: turn, points_rpm: [[0, 0], [1, 1]], beyond: held}",
+       "not in that unit"},
+      {"{kind: curve, joint: turn, points: [[0, 0], [1, 1]], beyond: nowhere}", "nowhere"},
+      {"{kind: curve, joint: turn, of: force, points: [[0, 0], [1, 1]], beyond: held}", "force"},
+      {"{kind: curve, joint: turn, points: [[0, 0], [1, 1]], slopes: [[0, 0]]}", "one pair"},
+      {"{kind: rotor, from: a, to: b, inertia: 1}", "turns no rotor"},
+      {"{kind: damping, from: a, to: b, coordinate: 1, damping: 1}", "one coordinate"},
+  };
+  for (const auto& [element, words] : cases) {
+    const std::string text = ElementFindings("  g: " + element + "\n");
+    EXPECT_NE(text.find("error"), std::string::npos) << element;
+    EXPECT_NE(text.find(words), std::string::npos) << element << "\n" << text;
+  }
 }
 
 TEST(Bushings, AreSixSpringsAndDampersBetweenTwoFrames) {

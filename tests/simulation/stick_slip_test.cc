@@ -126,6 +126,48 @@ TEST(SimulatedStickSlip, TwoBlocksRestMoveTogetherOrSlip) {
   }
 }
 
+// Flies to a stop, swings half a period there and flies back; the same by a curve with a corner.
+TEST(SimulatedPieces, AStopReturnsWhatMeetsItAtFourthOrder) {
+  const double mass = 2.0, k = 800.0, gap = 0.2, v0 = 1.5, w = std::sqrt(k / mass);
+  const double meets = gap / v0, leaves = meets + std::numbers::pi / w;
+  const auto x = [&](double t) {
+    if (t < meets) return v0 * t;
+    return t < leaves ? gap + v0 / w * std::sin(w * (t - meets)) : gap - v0 * (t - leaves);
+  };
+  Mechanism m = StackedBlocks{{mass}, {CoulombFriction(0.0)}}.Make();
+  const auto error = [&](double step_s) {
+    const SimulationRun run = SlipFreely(m, StackedBlocks::From(m, 0.0, v0, 0.6), step_s);
+    EXPECT_TRUE(run.summary.ok()) << run.summary.message;
+    return Farthest(run.trace, "motor1.position", x);
+  };
+  m.elements[0].law = StopLaw{.upper = gap, .stiffness = k};
+  const double coarse = error(2e-3), fine = error(5e-4);
+  EXPECT_LT(coarse, 2e-6);
+  EXPECT_LT(fine, coarse / 100.0);  // 256 where corners cost nothing
+  m.elements[0].law = CurveLaw{.knots = {{gap, 0.0, 0.0, -k}, {gap + 0.01, -0.01 * k, -k, -k}}};
+  EXPECT_LT(error(5e-4), 2.0 * fine);
+  m.elements[0].law = StopLaw{.upper = gap, .stiffness = k * (1.0 + 1e-4)};
+  EXPECT_GT(error(5e-4), 10.0 * fine);
+}
+
+TEST(SimulatedPieces, AStopWithDissipationLosesWhatItsIntegralSays) {
+  const double mass = 2.0, gap = 0.2, v0 = 1.5;
+  const StopLaw law{.upper = gap, .stiffness = 4e3, .exponent = 2.0, .dissipation = 0.3};
+  const double a = law.dissipation;
+  const auto integral = [&](double v) { return v / a - std::log1p(a * v) / (a * a); };
+  Mechanism m = StackedBlocks{{mass}, {CoulombFriction(0.0)}}.Make();
+  m.elements[0].law = law;
+  const SimulationRun run = SlipFreely(m, StackedBlocks::From(m, 0.0, v0, 0.6), 5e-4);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const auto last = [&](const char* channel) {
+    return run.trace.values(run.trace.values.rows() - 1, run.trace.Find(channel));
+  };
+  const double v = last("motor1.velocity");
+  EXPECT_LT(v, -0.5);
+  EXPECT_NEAR(integral(v), integral(v0), 1e-8);
+  EXPECT_NEAR(last("dampers.work"), 0.5 * mass * (v * v - v0 * v0), 1e-7);
+}
+
 // Events leave the order of the scheme: a quarter of the step, far less than a sixteenth.
 TEST(SimulatedStickSlip, ConvergesWithTheStep) {
   const FrictionLaw law{.coulomb = 1.0, .breakaway = 2.0, .stribeck_rate = 0.3};

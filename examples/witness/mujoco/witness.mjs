@@ -15,9 +15,9 @@ const DECLINED = [{what: 'joint reactions', why: 'only drives, outputs and loops
 
 // What MuJoCo has no word for, or what the generated model leaves to whoever steps it.
 function refuse(mechanism, loads, simulation) {
-  const native = (element) => !element.law.carrier && !element.on.bushing &&
-      (element.law.damping !== undefined || element.law.inertia !== undefined && element.on.joint ||
-       element.law.polynomial?.length === 1 && element.law.polynomial[0] > 0);
+  const native = (element) => !element.law.carrier && !element.on.bushing && !element.on.spring &&
+      (element.kind === 'damping' || element.kind === 'rotor' && element.on.joint ||
+       element.kind === 'spring' && element.law.polynomial.length === 1 && element.law.polynomial[0] > 0);
   const strange = mechanism.elements.filter((element) => !native(element)).map((element) => element.name);
   if (mechanism.bushings.length > 0) throw new Refused('MuJoCo has no bushings');
   if (strange.length > 0) throw new Refused(`MuJoCo has no force element like ${strange.join(', ')}`);

@@ -699,15 +699,22 @@ class Prover {
     return loaded_.empty() ? "" : AddLoadFriction(system, motions);
   }
 
-  // Friction F_d = −s_d μ_d r_d n_d by the loads n_e across the axes of joints. Forces depend on it
-  // linearly, so that with p_e the load without it and P_ed of a unit force,
-  //   n_e = |p_e + Σ_d F_d P_ed| =: g_e(n)
-  // which contracts by q = max_e Σ_d |P_ed| μ_d r_d: |n − ñ| ≤ |g(ñ) − ñ| / (1 − q) where q < 1.
+  // Friction F_d = −s_d c_d n_d by the loads n_e of bearings, (1) of FrictionLaw, c: PerLoad().
+  // Forces depend on it linearly, so that with p_e the load without it and P_ed of a unit force,
+  //   n_e = |p_e + Σ_d F_d P_ed| =: g_e(n), |p|: the sum of the lengths of its parts
+  // which contracts by q = max_e Σ_d |P_ed| c_d: |n − ñ| ≤ |g(ñ) − ñ| / (1 − q) where q < 1.
   struct Loaded {
-    size_t joint = 0;
+    size_t element = 0;
     T slope;  ///< F_d / n_d
     std::vector<Wrench<T>> wrenches;
   };
+  using Bearings = std::array<exact::Vector<T>, 3>;
+  static double LargestRadius(const FrictionLaw& law) {
+    return std::max(law.radius, law.thrust_radius);
+  }
+  static T PerLoad(const FrictionLaw& law) {
+    return T(law.coefficient) * T(LargestRadius(law));
+  }
   std::string AddLoadFriction(const System& system, const std::vector<Virtual>& motions) {
     if (!reactions_unique_) {
       return "not provable: redundant constraints share the load of a joint with friction by load";
@@ -715,9 +722,9 @@ class Prover {
     const size_t n = loaded_.size();
     std::vector<std::vector<T>> response(n);
     std::vector<std::vector<Six<T>>> exerted(n);
-    std::vector<exact::Vector<T>> p(n);
-    std::vector<std::vector<exact::Vector<T>>> P(n, std::vector<exact::Vector<T>>(n));
-    for (size_t e = 0; e < n; ++e) p[e] = AcrossAxis(loaded_[e].joint, carried_, force_);
+    std::vector<Bearings> p(n);
+    std::vector<std::vector<Bearings>> P(n, std::vector<Bearings>(n));
+    for (size_t e = 0; e < n; ++e) p[e] = BearingsOf(loaded_[e].element, carried_, force_);
     for (size_t d = 0; d < n; ++d) {
       std::vector<T> work;
       work.reserve(motions.size());
@@ -728,7 +735,7 @@ class Prover {
       exerted[d].resize(carried_.size());
       Exert(T(1), loaded_[d].wrenches, &exerted[d]);
       for (size_t e = 0; e < n; ++e) {
-        P[e][d] = AcrossAxis(loaded_[e].joint, exerted[d], response[d]);
+        P[e][d] = BearingsOf(loaded_[e].element, exerted[d], response[d]);
       }
     }
     double contraction = 0.0;
@@ -741,9 +748,12 @@ class Prover {
     const auto loads = [&](const std::vector<T>& of) {
       std::vector<T> next(n);
       for (size_t e = 0; e < n; ++e) {
-        exact::Vector<T> sum = p[e];
-        for (size_t d = 0; d < n; ++d)
-          sum = sum + exact::Times(T(loaded_[d].slope * of[d]), P[e][d]);
+        Bearings sum = p[e];
+        for (size_t d = 0; d < n; ++d) {
+          for (size_t k = 0; k < sum.size(); ++k) {
+            sum[k] = sum[k] + exact::Times(T(loaded_[d].slope * of[d]), P[e][d][k]);
+          }
+        }
         next[e] = Norm(sum);
       }
       return next;
@@ -770,18 +780,46 @@ class Prover {
     }
     return "";
   }
-  static T Norm(const exact::Vector<T>& v) { return sqrt(T(Dot(v, v))); }
-  // Of the force that a joint bears, in its frame, where bodies have to be carried so and the
-  // chosen forces are these.
-  [[nodiscard]] exact::Vector<T> AcrossAxis(size_t j, const std::vector<Six<T>>& carried,
-                                            const std::vector<T>& forces) const {
+  // Parts that are zero by how the joint is made have no slope.
+  static T Norm(const Bearings& load) {
+    T sum(0);
+    for (const exact::Vector<T>& part : load) {
+      const T square = Dot(part, part);
+      if (!exact::IsZero(square)) sum += sqrt(square);
+    }
+    return sum;
+  }
+  // Of what a joint bears, in its frame, where bodies have to be carried so and the chosen forces
+  // are these.
+  [[nodiscard]] Bearings BearingsOf(size_t e, const std::vector<Six<T>>& carried,
+                                    const std::vector<T>& forces) const {
     std::vector<T> all(forces_.size(), T(0));
     for (size_t k = 0; k < columns_.size(); ++k) all[columns_[k]] = forces[k];
+    const ForceElement& element = mechanism().elements[e];
+    const auto& law = std::get<FrictionLaw>(element.law);
+    const auto j = static_cast<size_t>(element.joint);
     const Joint& joint = mechanism().joints[j];
     const std::array<T, 6> bears = model_.InJoint(joint, ReactionsOf(carried, all)[j], bodies_);
-    const exact::Vector<T> f{{bears[0], bears[1], bears[2]}};
-    const exact::Vector<T> axis = exact::Unit(exact::Lifted<T>(joint.axis));
-    return f - exact::Times(T(Dot(axis, f)), axis);
+    const exact::Vector<T> f{{bears[0], bears[1], bears[2]}}, m{{bears[3], bears[4], bears[5]}};
+    const T largest(LargestRadius(law)), radial = T(law.radius) / largest;
+    Bearings load{exact::Vector<T>{{T(0), T(0), T(0)}}, exact::Vector<T>{{T(0), T(0), T(0)}},
+                  exact::Vector<T>{{T(0), T(0), T(0)}}};
+    if (IsOfBall(joint.kind, element.coordinate)) {
+      load[0] = exact::Times(radial, f);
+      return load;
+    }
+    const exact::Vector<T> axis = model_.AxisInJoint(joint, element.coordinate, bodies_);
+    const T thrust = Dot(axis, f);
+    const exact::Vector<T> across = f - exact::Times(thrust, axis);
+    load[0] = exact::Times(radial, across);
+    load[2][0] = T(law.thrust_radius) / largest * thrust;
+    if (std::isfinite(law.length)) {
+      const exact::Vector<T> half = exact::Times(T(radial / T(2)), across);
+      const exact::Vector<T> couple = exact::Times(T(radial / T(law.length)), Cross(m, axis));
+      load[0] = half + couple;
+      load[1] = half - couple;
+    }
+    return load;
   }
 
   // More drives than are needed: of all forces x that A x = b allows, those of drives and
@@ -914,6 +952,7 @@ class Prover {
 
   // Loads, springs and elements; gravity's compensation that drives exert.
   std::string Apply(const Start& start) {
+    engaged_ = start.command.engaged;
     for (const LoadSample& load : start.command.loads) {
       const auto b = static_cast<size_t>(load.body);
       exact::Vector<T> f = exact::Lifted<T>(load.force), m = exact::Lifted<T>(load.moment);
@@ -947,6 +986,48 @@ class Prover {
     return "";
   }
 
+  // Of a stop, where it is known which of its pieces acts; false where that is open.
+  static bool PushOf(const StopLaw& law, const Series<T>& x, T* force) {
+    using std::exp;
+    using std::log;
+    const bool above = Below(x.v) > law.upper, below = Above(x.v) < law.lower;
+    if (!above && !below) return Above(x.v) <= law.upper && Below(x.v) >= law.lower;
+    const T depth = above ? T(x.v - T(law.upper)) : T(T(law.lower) - x.v);
+    const T rate = above ? x.r : T(-x.r), side = T(above ? -1.0 : 1.0);
+    T e = T(law.stiffness) * depth;
+    if (law.exponent != 1.0) e = T(law.stiffness) * exp(T(T(law.exponent) * log(depth)));
+    const bool by_depth = law.dissipation > 0.0;
+    const T damped = by_depth ? T(e * T(law.dissipation) * rate) : T(T(law.damping) * rate);
+    const T least = e + damped, most = e - damped;  // without force, with twice the elastic one
+    if (Above(least) < 0.0) return true;
+    if (!(Below(least) >= 0.0)) return false;
+    if (!by_depth && Above(most) < 0.0) {
+      *force = side * (e + e);
+      return true;
+    }
+    *force = side * least;
+    return by_depth || Below(most) >= 0.0;
+  }
+
+  // On a curve, by Bernstein's polynomials between knots.
+  static bool ForceOnCurve(const CurveLaw& law, const T& x, T* force) {
+    const std::vector<CurveLaw::Knot>& knots = law.knots;
+    size_t k = 0;
+    while (k < knots.size() && Below(x) >= knots[k].at) ++k;
+    if (k < knots.size() && Above(x) > knots[k].at) return false;
+    if (k == 0 || k == knots.size()) {
+      const CurveLaw::Knot& end = k == 0 ? knots.front() : knots.back();
+      *force = T(end.force) + T(k == 0 ? end.slope_before : end.slope_after) * (x - T(end.at));
+      return true;
+    }
+    const CurveLaw::Knot &a = knots[k - 1], &b = knots[k];
+    const T h = T(b.at) - T(a.at), t = (x - T(a.at)) / h, s = T(1) - t, third = h / T(3);
+    const T b1 = T(a.force) + third * T(a.slope_after);
+    const T b2 = T(b.force) - third * T(b.slope_before);
+    *force = s * s * (s * T(a.force) + T(3) * t * b1) + t * t * (T(3) * s * b2 + t * T(b.force));
+    return true;
+  }
+
   std::string ApplyElement(size_t e) {
     using std::exp;
     const ForceElement& element = mechanism().elements[e];
@@ -959,6 +1040,7 @@ class Prover {
       wrenches = model_.WrenchesAt(element_equations_[e], bodies_);
     }
     T force(0);
+    const T share(e < engaged_.size() ? engaged_[e] : 1.0);
     if (const auto* damping = std::get_if<DampingLaw>(&element.law)) {
       force = -T(damping->damping) * x.r;
     } else if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
@@ -973,6 +1055,16 @@ class Prover {
         const auto b = static_cast<size_t>(rotor->carrier->body);
         carried_[b].m = carried_[b].m + exact::Times(T(J * n), moment);
       }
+    } else if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
+      if (!PushOf(*stop, x, &force)) {
+        return fmt::format("not provable: on which side of a corner '{}' is, is open",
+                           element.name);
+      }
+    } else if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
+      if (!ForceOnCurve(*curve, curve->of_rate ? x.r : x.v, &force)) {
+        return fmt::format("not provable: on which side of a knot '{}' is, is open", element.name);
+      }
+      force = share * force;
     } else if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
       const double rest = RestRate(mechanism(), element, motion_.duration_s);
       const double low = Below(x.r), high = Above(x.r);
@@ -990,10 +1082,12 @@ class Prover {
           const T slowness = x.r / T(friction->stribeck_rate);
           size += (T(friction->breakaway) - T(friction->coulomb)) * exp(T(-slowness * slowness));
         }
-        force = T(-sign) * size;
-        if (friction->coefficient > 0.0) {
-          const T slope = T(friction->coefficient) * T(friction->radius);
-          loaded_.push_back({static_cast<size_t>(element.joint), T(-sign) * slope, wrenches});
+        force = T(-sign) * share * size;
+        if (friction->coupling >= 0) {
+          return fmt::format("not provable: '{}' follows the force of a coupling", element.name);
+        }
+        if (friction->by_load()) {
+          loaded_.push_back({e, T(-sign) * share * PerLoad(*friction), wrenches});
         }
       }
     }
@@ -1082,6 +1176,7 @@ class Prover {
   Wrenches wrenches_;             ///< of asked_, there
   std::vector<Virtual> virtual_;  ///< of the tree's coordinates, then released ones
   typename Model<T>::Motions motions_;
+  std::vector<double> engaged_;  ///< CommandSample::engaged
   std::vector<Six<T>> carried_;  ///< required less applied, per body
   std::vector<Force> forces_;
   std::vector<Loaded> loaded_;  ///< friction by load, of what slides

@@ -286,6 +286,9 @@ Equation<T> Model<T>::ElementEquation(const ForceElement& element, double near) 
   if (element.joint >= 0) {
     return CoordinateEquation({Coordinate::Kind::kJoint, element.joint, element.coordinate}, near);
   }
+  if (element.spring >= 0) {
+    return LengthEquation(mechanism_.springs[static_cast<size_t>(element.spring)]);
+  }
   Scalar<T> scalar;
   scalar.frames = bushing_pair_[static_cast<size_t>(element.bushing)];
   scalar.length = element.coordinate < 3;
@@ -697,6 +700,14 @@ std::array<T, 6> Model<T>::InJoint(const Joint& joint, const Six<T>& on_child,
   const Frame<T> M = ChildFrame(pair, bodies);
   const Vector<T> f = R_FW * on_child.f, m = R_FW * (on_child.m - Cross(M.p, on_child.f));
   return {f[0], f[1], f[2], m[0], m[1], m[2]};
+}
+
+template <typename T>
+Vector<T> Model<T>::AxisInJoint(const Joint& joint, int coordinate, const Poses& bodies) const {
+  if (joint.kind != JointKind::kUniversal || coordinate == 0) return Unit(Lifted<T>(joint.axis));
+  const size_t pair = joint_pair_[static_cast<size_t>(&joint - mechanism_.joints.data())];
+  return Transposed(ParentFrame(pair, bodies).R) *
+         (ChildFrame(pair, bodies).R * Unit(Lifted<T>(joint.axis2)));
 }
 
 template class Model<Fine>;

@@ -566,6 +566,9 @@ class Model {
   /// [f; m] about M's origin in F's axes of a wrench on the joint's child.
   [[nodiscard]] std::array<T, 6> InJoint(const Joint& joint, const Six<T>& on_child,
                                          const Poses& bodies) const;
+  /// The axis that a joint's coordinate turns about or slides along, unit, in F's axes.
+  [[nodiscard]] Vector<T> AxisInJoint(const Joint& joint, int coordinate,
+                                      const Poses& bodies) const;
   [[nodiscard]] int OutboardOf(size_t tree_joint) const { return tree_[tree_joint].outboard; }
 
  private:

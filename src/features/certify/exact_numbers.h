@@ -58,6 +58,7 @@ inline Dual cos(const Dual& a) { return {std::cos(a.x), -std::sin(a.x) * a.d}; }
 inline Dual atan(const Dual& a) { return {std::atan(a.x), a.d / (1.0 + a.x * a.x)}; }
 inline Dual acos(const Dual& a) { return {std::acos(a.x), -a.d / std::sqrt(1.0 - a.x * a.x)}; }
 inline Dual exp(const Dual& a) { return {std::exp(a.x), std::exp(a.x) * a.d}; }
+inline Dual log(const Dual& a) { return {std::log(a.x), a.d / a.x}; }
 inline Dual abs(const Dual& a) { return a.x < 0.0 ? -a : a; }
 inline bool IsZero(const Dual& a) { return a.x == 0.0 && a.d == 0.0; }
 inline bool AtMost(const Dual& a, double bound) { return a.x <= bound; }

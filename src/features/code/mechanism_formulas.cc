@@ -947,6 +947,11 @@ class FormulaMaker {
         Unsupported("there is a bushing");
         continue;
       }
+      if (element.spring >= 0 || std::holds_alternative<StopLaw>(element.law) ||
+          std::holds_alternative<CurveLaw>(element.law)) {
+        Unsupported("there is a " + Described(m_, element));
+        continue;
+      }
       const Coordinate at =
           element.joint >= 0
               ? Coordinate{Coordinate::Kind::kJoint, element.joint, element.coordinate}
@@ -986,7 +991,7 @@ class FormulaMaker {
         }
         Take(v, force, along);
       } else if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
-        if (friction->per_load() > 0.0)
+        if (friction->by_load())
           Unsupported(Described(m_, element) + " grows with its load");
         const Expr direction = made_->graph.Make(FormulaOp::kDirection, v,
                                                  Expr(RestRate(m_, element, Motion().duration_s)));

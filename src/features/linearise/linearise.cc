@@ -310,6 +310,7 @@ class Lineariser {
                     "");
     }
     if (settings_.equilibrium) return Refuse("--equilibrium: the scenario gives the state", "");
+    if (!motion.switches.empty()) return Refuse("derivatives do not know switched elements", "");
     ReducedModel along(mechanism_, motion.commands);
     along.Explain(false);
     std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);

@@ -120,6 +120,10 @@ SampledDerivatives Compute(const Mechanism& mechanism, const Motion& motion, siz
     result.why_not = "forces are given, and the motion is integrated";
     return result;
   }
+  if (!motion.switches.empty()) {
+    result.why_not = "elements are switched";
+    return result;
+  }
   const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
   std::set<size_t> chosen;
   const size_t spread = count == 0 ? times.size() : std::min(count, times.size());

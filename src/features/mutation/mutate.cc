@@ -420,6 +420,18 @@ bool SameLaw(const SpringLaw& a, const SpringLaw& b) {
          std::ranges::equal(a.polynomial, b.polynomial,
                             [](double x, double y) { return Same(x, y); });
 }
+bool SameLaw(const StopLaw& a, const StopLaw& b) {
+  return a.lower == b.lower && a.upper == b.upper && Same(a.stiffness, b.stiffness) &&
+         Same(a.exponent, b.exponent) && Same(a.damping, b.damping) &&
+         Same(a.dissipation, b.dissipation);
+}
+bool SameLaw(const CurveLaw& a, const CurveLaw& b) {
+  const auto same = [](const CurveLaw::Knot& x, const CurveLaw::Knot& y) {
+    return Same(x.at, y.at) && Same(x.force, y.force) && Same(x.slope_before, y.slope_before) &&
+           Same(x.slope_after, y.slope_after);
+  };
+  return a.of_rate == b.of_rate && std::ranges::equal(a.knots, b.knots, same);
+}
 bool SameLaw(const RotorLaw& a, const RotorLaw& b) {
   const auto momentum = [](const RotorLaw& law) -> Vec3 {
     if (!law.carrier) return Vec3::Zero();
@@ -429,7 +441,10 @@ bool SameLaw(const RotorLaw& a, const RotorLaw& b) {
 }
 bool SameLaw(const FrictionLaw& a, const FrictionLaw& b) {
   return Same(a.coulomb, b.coulomb) && Same(a.breakaway, b.breakaway) &&
-         Same(a.stribeck_rate, b.stribeck_rate) && Same(a.per_load(), b.per_load());
+         Same(a.stribeck_rate, b.stribeck_rate) && Same(a.coefficient, b.coefficient) &&
+         Same(a.coefficient * a.radius, b.coefficient * b.radius) &&
+         Same(a.thrust_radius, b.thrust_radius) && a.coupling == b.coupling &&
+         (a.length == b.length || Same(a.length, b.length));
 }
 
 bool SameElement(const ForceElement& a, const ForceElement& b) {

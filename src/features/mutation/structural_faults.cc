@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <tuple>
 
 #include "kinematics/home.h"
 #include "mechanism/spanning_tree.h"
@@ -121,6 +122,15 @@ class Collector {
   static void CountBackwards(int joint, ForceElement* element) {
     auto* spring = std::get_if<SpringLaw>(&element->law);
     if (element->joint != joint) return;
+    if (auto* stop = std::get_if<StopLaw>(&element->law)) {
+      std::tie(stop->lower, stop->upper) = std::pair(-stop->upper, -stop->lower);
+    }
+    if (auto* curve = std::get_if<CurveLaw>(&element->law)) {
+      for (CurveLaw::Knot& knot : curve->knots) {
+        knot = {-knot.at, -knot.force, knot.slope_after, knot.slope_before};
+      }
+      std::ranges::reverse(curve->knots);
+    }
     if (IsGyroscopic(*element)) std::get<RotorLaw>(element->law).ratio *= -1.0;
     if (spring == nullptr) return;
     spring->free *= -1.0;
@@ -128,10 +138,10 @@ class Collector {
     for (size_t i = 1; i < spring->polynomial.size(); i += 2) spring->polynomial[i] *= -1.0;
   }
 
-  // The force of a preload acts the other way; a gear turns a rotor as if its inertia grew with
-  // the ratio and not with its square.
+  // The force of a preload or a curve acts the other way, that of a stop grows with the depth
+  // alone; a gear turns a rotor as if its inertia grew with the ratio and not with its square.
   void WrongElements() {
-    std::map<std::string, size_t> preloaded, geared;
+    std::map<std::string, size_t> preloaded, geared, curved, stopped;
     for (size_t e = 0; e < m_.elements.size(); ++e) {
       const ForceElement& element = m_.elements[e];
       Mechanism wrong = m_;
@@ -139,6 +149,16 @@ class Collector {
         if (spring->preload == 0.0 || !IsFirst(&preloaded, element.name)) continue;
         std::get<SpringLaw>(wrong.elements[e].law).preload *= -1.0;
         Add("preload the other way", element.name, std::move(wrong));
+      } else if (std::holds_alternative<CurveLaw>(element.law)) {
+        if (!IsFirst(&curved, element.name)) continue;
+        for (CurveLaw::Knot& knot : std::get<CurveLaw>(wrong.elements[e].law).knots) {
+          knot = {knot.at, -knot.force, -knot.slope_before, -knot.slope_after};
+        }
+        Add("curve the other way", element.name, std::move(wrong));
+      } else if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
+        if (stop->exponent == 1.0 || !IsFirst(&stopped, element.name)) continue;
+        std::get<StopLaw>(wrong.elements[e].law).exponent = 1.0;
+        Add("stop without its exponent", element.name, std::move(wrong));
       } else if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
         if (std::abs(rotor->ratio) == 1.0 || !IsFirst(&geared, element.name)) continue;
         std::get<RotorLaw>(wrong.elements[e].law).ratio = std::sqrt(std::abs(rotor->ratio));

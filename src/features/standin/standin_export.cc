@@ -193,8 +193,8 @@ Mechanism SerialRobot(const Transmission& transmission, const VecX& armature) {
   KeepOnly(&robot.prescribed, [&](Prescribed* at) { return rename_joint(&at->joint); });
   KeepOnly(&robot.outputs,
            [&](Output* at) { return rename_body(&at->body) && rename_body(&at->reference_body); });
-  KeepOnly(&robot.springs, [&](SpringDamper* at) {
-    return rename_body(&at->body_from) && rename_body(&at->body_to);
+  EraseSprings(&robot, [&](SpringDamper& at) {
+    return !rename_body(&at.body_from) || !rename_body(&at.body_to);
   });
   KeepOnly(&robot.couplings, [&](Coupling* at) {
     return std::ranges::all_of(at->terms,
@@ -282,7 +282,11 @@ StandinExport ExportStandin(const Mechanism& mechanism, const StandinResult& res
     });
   };
   without(&rest.elements, transmission->serial.elements);
-  without(&rest.springs, transmission->serial.springs);
+  EraseSprings(&rest, [&](const SpringDamper& spring) {
+    return std::ranges::any_of(transmission->serial.springs, [&](const SpringDamper& other) {
+      return other.name == spring.name;
+    });
+  });
   CodeTask task{.coordinates = transmission->joints,
                 .held = transmission->held,
                 .whole = &transmission->full,

@@ -495,10 +495,11 @@ class TransmissionFinder {
       if (element.drive >= 0) {
         return std::ranges::find(found_.drives, element.drive) != found_.drives.end();
       }
+      if (element.spring >= 0) return false;  // goes with its spring
       const Bushing& bushing = full.bushings[static_cast<size_t>(element.bushing)];
       return in_loop(bushing.parent, bushing.child);
     });
-    std::erase_if(serial.springs, [&](const SpringDamper& spring) {
+    EraseSprings(&serial, [&](const SpringDamper& spring) {
       return in_loop(spring.body_from, spring.body_to);
     });
     Mechanism& inertia = found_.loop_inertia;
@@ -636,7 +637,7 @@ Mechanism MovingPart(const Mechanism& mechanism, const Transmission& transmissio
   });
   keep(&part.prescribed, [&](Prescribed* one) { return follow(joint_at, &one->joint); });
   keep(&part.motors, [&](Motor* motor) { return follow(drive_at, &motor->drive); });
-  keep(&part.springs, [&](SpringDamper* spring) {
+  const std::vector<int> spring_at = keep(&part.springs, [&](SpringDamper* spring) {
     move_point(&spring->body_from, &spring->p_from);
     move_point(&spring->body_to, &spring->p_to);
     return spring->body_from != spring->body_to;
@@ -652,7 +653,7 @@ Mechanism MovingPart(const Mechanism& mechanism, const Transmission& transmissio
       });
     }
     return follow(joint_at, &element->joint) || follow(drive_at, &element->drive) ||
-           follow(bushing_at, &element->bushing);
+           follow(bushing_at, &element->bushing) || follow(spring_at, &element->spring);
   });
   return BuildSpanningTree(&part).ok() ? part : mechanism;
 }

@@ -782,10 +782,17 @@ class Companion {
     std::string place;
     if (element.drive >= 0) {
       place = "drive: " + YamlName(m_.drives[static_cast<size_t>(element.drive)].name);
+    } else if (element.spring >= 0) {
+      place = "spring: " + YamlName(m_.springs[static_cast<size_t>(element.spring)].name);
     } else {
       const auto [joint, k] = FindCoordinate(element.joint, element.coordinate);
       place = fmt::format("joint: \"{}\"{}", joint,
                           ActsOnBall(m_, element) ? kRotationText : CoordinateText(k));
+    }
+    const auto* friction = std::get_if<FrictionLaw>(&element.law);
+    if (friction != nullptr && friction->coupling >= 0) {
+      place += ", coupling: " +
+               YamlName(m_.couplings[static_cast<size_t>(friction->coupling)].name);
     }
     if (IsGyroscopic(element)) {
       const RotorAxis& axis = *std::get<RotorLaw>(element.law).carrier;

@@ -246,7 +246,7 @@ std::vector<UrdfStep> UrdfSteps(const Joint& joint, bool reversed) {
 }
 
 bool IsUrdfDynamics(const Mechanism& mechanism, const ForceElement& element) {
-  if (element.drive >= 0 || element.bushing >= 0) return false;
+  if (element.joint < 0) return false;
   if (!std::holds_alternative<DampingLaw>(element.law)) return false;
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
   return !joint.closure && joint.kind != JointKind::kFree;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,6 +29,13 @@ struct UnitSuffix {
 inline constexpr UnitSuffix kPlain{"", "", [](double value) { return value; }};
 inline constexpr UnitSuffix kDeg{"_deg", "rad", FromDegrees};
 inline constexpr UnitSuffix kMm{"_mm", "m", FromMillimetres};
+inline constexpr UnitSuffix kRpm{
+    "_rpm", "rad/s", [](double value) { return value * std::numbers::pi / 30.0; }};
+/// Of what data sheets state: N/mm and N s/mm, N m/° and N m s/°, kg cm².
+inline constexpr UnitSuffix kPerMm{"_per_mm", "m", [](double value) { return value * 1e3; }};
+inline constexpr UnitSuffix kPerDeg{"_per_deg", "rad",
+                                    [](double value) { return value / FromDegrees(1.0); }};
+inline constexpr UnitSuffix kKgCm2{"_kgcm2", "", [](double value) { return value / 1e4; }};
 
 /// A name, and the unit that its end states.
 struct NameInUnit {

@@ -324,8 +324,8 @@ double ConstraintSystem::FrictionUnit(int row) const {
 }
 
 double ConstraintSystem::Breakaway(size_t element) const {
-  return std::get<FrictionLaw>(engine_.mechanism->elements[element].law).breakaway +
-         load_friction(element);
+  const auto& law = std::get<FrictionLaw>(engine_.mechanism->elements[element].law);
+  return engaged(element) * law.breakaway + load_friction(element);
 }
 
 double ConstraintSystem::HeldLoss(int row) const {

@@ -127,6 +127,11 @@ class ConstraintSystem {
 
   /// Friction by the joints' loads that force() balances, per force element; empty: none.
   void SetLoadFriction(const VecX& size) { load_friction_ = size; }
+  /// Share of its force with which a force element acts (Switch), per element; empty: all 1.
+  void SetEngaged(std::vector<double> share) { engaged_ = std::move(share); }
+  [[nodiscard]] double engaged(size_t element) const {
+    return element < engaged_.size() ? engaged_[element] : 1.0;
+  }
   [[nodiscard]] double load_friction(size_t element) const {
     return load_friction_.size() == 0 ? 0.0 : load_friction_[static_cast<Eigen::Index>(element)];
   }
@@ -183,6 +188,7 @@ class ConstraintSystem {
   std::vector<bool> coupling_is_length_;
   VecX given_, load_friction_;
   std::vector<int> sliding_;
+  std::vector<double> engaged_;
   MatX unit_;  // column k: gradient of driven joint k, where it has no row
   Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)
 };

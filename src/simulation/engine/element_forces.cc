@@ -110,7 +110,7 @@ std::string FrictionTrouble(const ForceElement& element, DriveMode drives, bool 
            "the motion does so a little earlier or later: servos follow (mode: servo)";
   }
   if (own_events) return "";
-  if (law.per_load() > 0.0) return "MuJoCo's frictionloss knows no load of the joint";
+  if (law.by_load()) return "MuJoCo's frictionloss knows no load of the joint";
   if (law.breakaway == law.coulomb) return "";
   return "MuJoCo's frictionloss knows no breakaway force other than coulomb";
 }
@@ -161,6 +161,57 @@ void AddCarrier(const ConstraintSystem& system, size_t element, ElementMotion* a
   turning.along_rate = turning.axis.dot(system.AngularAcceleration(body));
 }
 
+// Of a stop: what it pushes back with, and its elastic part, towards smaller coordinates.
+struct StopForce {
+  double whole = 0.0, elastic = 0.0, stored = 0.0;
+};
+StopForce OfStop(const StopLaw& law, const ElementMotion& at) {
+  // Depths beyond the upper end count up, beyond the lower one down.
+  const double beyond = at.position - std::clamp(at.position, law.lower, law.upper);
+  if (beyond == 0.0) return {};
+  const double way = std::copysign(1.0, beyond), closing = way * at.rate;
+  const double spring = law.stiffness * std::pow(std::abs(beyond), law.exponent);
+  double damper = law.damping * closing;
+  if (law.dissipation > 0.0) damper = law.dissipation * closing * spring;
+  damper = std::max(damper, -spring);
+  if (law.dissipation == 0.0) damper = std::min(damper, spring);
+  return {.whole = way * (spring + damper),
+          .elastic = way * spring,
+          .stored = spring * std::abs(beyond) / (1.0 + law.exponent)};
+}
+
+// A curve's force by its power series about the knot before.
+double OfCurve(const CurveLaw& law, double x) {
+  const auto after = std::ranges::upper_bound(law.knots, x, {}, &CurveLaw::Knot::at);
+  if (after == law.knots.begin()) return after->force - after->slope_before * (after->at - x);
+  const CurveLaw::Knot& from = *std::prev(after);
+  const double u = x - from.at;
+  if (after == law.knots.end()) return from.force + from.slope_after * u;
+  const double h = after->at - from.at, rise = after->force - from.force;
+  const double second = (3.0 * rise / h - 2.0 * from.slope_after - after->slope_before) / h;
+  const double third = (from.slope_after + after->slope_before - 2.0 * rise / h) / (h * h);
+  return from.force + (from.slope_after + (second + third * u) * u) * u;
+}
+
+// Gauss's three points, exact for a cubic, on each piece from the first knot.
+double CurveIntegral(const CurveLaw& law, double x) {
+  const double reach = std::sqrt(0.6);
+  const auto piece = [&](double a, double b) {
+    const double middle = 0.5 * (a + b), half = 0.5 * (b - a);
+    return half / 9.0 *
+           (5.0 * OfCurve(law, middle - reach * half) + 8.0 * OfCurve(law, middle) +
+            5.0 * OfCurve(law, middle + reach * half));
+  };
+  double from = law.knots.front().at, sum = 0.0;
+  if (x < from) return piece(from, x);
+  for (const CurveLaw::Knot& knot : law.knots) {
+    const double to = std::min(x, knot.at);
+    sum += piece(from, to);
+    from = to;
+  }
+  return sum + piece(from, x);
+}
+
 // Σ_i c_i x^(i+1)
 double PowerSum(const std::vector<double>& c, double x) {
   double sum = 0.0, power = x;
@@ -193,6 +244,7 @@ ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
     at = {d.ten_length[place.tendon], u.dot(ConstVecX(d.qvel, system.nv())),
           u.dot(ConstVecX(d.qacc, system.nv())) + system.TendonBias(place.tendon)};
   }
+  at.engaged = system.engaged(element);
   at.rests = std::abs(at.rate) <= place.rest_rate;
   at.load_friction = system.load_friction(element);
   AddHolding(system, element, &at);
@@ -226,9 +278,14 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     if (at.rests) return at.held;
     const double ratio = at.rate / friction->stribeck_rate;
     const double curve = friction->stribeck_rate > 0.0 ? std::exp(-(ratio * ratio)) : 0.0;
-    const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
+    const double most =
+        at.engaged * (friction->breakaway * curve + friction->coulomb * (1.0 - curve));
     if (at.sliding != 0) return -at.sliding * (most + at.load_friction);
     return -std::copysign(most + at.load_friction, at.rate);
+  }
+  if (const auto* stop = std::get_if<StopLaw>(&element.law)) return -OfStop(*stop, at).whole;
+  if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
+    return at.engaged * OfCurve(*curve, curve->of_rate ? at.rate : at.position);
   }
   const auto& rotor = std::get<RotorLaw>(element.law);
   return -rotor.reflected() * at.acceleration - rotor.inertia * rotor.ratio * at.turning.along_rate;
@@ -246,15 +303,36 @@ double PowerOf(const ForceElement& element, const ElementMotion& at) {
   return IsGyroscopic(element) ? power + CarrierMoment(element, at).dot(at.turning.rate) : power;
 }
 
+double SpringPowerOf(const ForceElement& element, const ElementMotion& at) {
+  if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
+    return -OfStop(*stop, at).elastic * at.rate;
+  }
+  const auto* curve = std::get_if<CurveLaw>(&element.law);
+  const bool stores =
+      std::holds_alternative<SpringLaw>(element.law) || (curve != nullptr && !curve->of_rate);
+  return stores ? PowerOf(element, at) : 0.0;
+}
+
+double LostPowerOf(const ForceElement& element, const ElementMotion& at) {
+  if (std::holds_alternative<RotorLaw>(element.law)) return 0.0;
+  return PowerOf(element, at) - SpringPowerOf(element, at);
+}
+
 double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
   if (!at.rests || !HasFriction(element)) return 0.0;
-  return std::get<FrictionLaw>(element.law).breakaway + at.load_friction;
+  return at.engaged * std::get<FrictionLaw>(element.law).breakaway + at.load_friction;
 }
 
 ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
   if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
     return {.kinetic = 0.5 * rotor->reflected() * at.rate * at.rate +
                        rotor->inertia * rotor->ratio * at.rate * at.turning.along};
+  }
+  if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
+    return {.stored = OfStop(*stop, at).stored};
+  }
+  if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
+    return {.stored = curve->of_rate ? 0.0 : -CurveIntegral(*curve, at.position)};
   }
   const auto* spring = std::get_if<SpringLaw>(&element.law);
   if (spring == nullptr) return {};
@@ -267,6 +345,20 @@ ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
 
 ElementSlope SlopeOf(const ForceElement& element, double position) {
   if (const auto* damping = std::get_if<DampingLaw>(&element.law)) return {0.0, damping->damping};
+  if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
+    if (stop->exponent == 1.0) return {stop->stiffness, stop->damping};  // before it is met, too
+    const double depth = std::abs(position - std::clamp(position, stop->lower, stop->upper));
+    if (depth == 0.0) return {};
+    const double e = stop->stiffness * std::pow(depth, stop->exponent);
+    return {stop->exponent * e / depth, stop->damping + stop->dissipation * e};
+  }
+  if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
+    double steepest = 0.0;
+    for (const CurveLaw::Knot& knot : curve->knots) {
+      steepest = std::max({steepest, -knot.slope_before, -knot.slope_after});
+    }
+    return curve->of_rate ? ElementSlope{0.0, steepest} : ElementSlope{steepest, 0.0};
+  }
   const auto* spring = std::get_if<SpringLaw>(&element.law);
   if (spring == nullptr) return {};
   double slope = 0.0, power = 1.0;

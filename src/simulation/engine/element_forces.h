@@ -57,6 +57,7 @@ struct ElementMotion {
   bool rests = false;  ///< where it may have dry friction: at most at the rest rate, or held
   double load_friction = 0.0;  ///< by the joint's load (load_friction.h)
   int sliding = 0;             ///< where it is known: sign of the rate
+  double engaged = 1.0;        ///< share of its force that acts (Switch)
   double held = 0.0;           ///< force of MuJoCo's row that holds it
   RotorTurning turning = {};
 };
@@ -81,11 +82,9 @@ struct ElementMotion {
 
 /// What an element puts in [W].
 [[nodiscard]] double PowerOf(const ForceElement& element, const ElementMotion& at);
-/// True if the element takes power out of the mechanism for good.
-[[nodiscard]] inline bool Dissipates(const ForceElement& element) {
-  return std::holds_alternative<DampingLaw>(element.law) ||
-         std::holds_alternative<FrictionLaw>(element.law);
-}
+/// Of that, what comes from springs, and what is taken out of the mechanism for good (<= 0).
+[[nodiscard]] double SpringPowerOf(const ForceElement& element, const ElementMotion& at);
+[[nodiscard]] double LostPowerOf(const ForceElement& element, const ElementMotion& at);
 
 /// What elements exchange with the motion.
 struct ElementEnergy {
@@ -93,7 +92,7 @@ struct ElementEnergy {
 };
 [[nodiscard]] ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at);
 
-/// Slope of a spring's force over position, and of a damper's over rate.
+/// Slope of a spring's force over position, and of a damper's over rate; a curve's steepest one.
 struct ElementSlope {
   double stiffness = 0.0, damping = 0.0;
 };

@@ -145,9 +145,11 @@ RunSummary FindElements(EngineModel* engine) {
       engine->elements.push_back(place);
       continue;
     }
-    if (element.drive >= 0) {
-      const Drive& drive = mechanism.drives[static_cast<size_t>(element.drive)];
-      place.tendon = IdOf(m, mjOBJ_TENDON, drive.name);
+    if (element.drive >= 0 || element.spring >= 0) {
+      const std::string& name = element.drive >= 0
+                                    ? mechanism.drives[static_cast<size_t>(element.drive)].name
+                                    : mechanism.springs[static_cast<size_t>(element.spring)].name;
+      place.tendon = IdOf(m, mjOBJ_TENDON, name);
       engine->elements.push_back(place);
       continue;
     }

@@ -26,6 +26,9 @@ namespace {
 // a rate leaves that sign, or a held coordinate accelerates, are found with Runge–Kutta steps from
 // the node before; multistep history starts anew there. What is over between two nodes is not seen.
 //
+// Where DOFs move by forces, steps end on the corners of stops and curves as well (PieceOf()):
+// forces are continuous there, and a step across would lose its order.
+//
 // Joints of one loop stop together, but for what the scheme leaves undone in the loops. With J the
 // loops and commands, G_r what rests or stops, ẋ what is commanded, G_e has the rate
 //   q̇_e = G_e (v − e),  (J; G_r) e = (J v − ẋ; G_r v), e of least norm                          (1)
@@ -37,14 +40,16 @@ class StickSlip {
   /// All outlive the object.
   StickSlip(Session* session, Integrator* integrator, CommandAt command);
 
-  /// True where something with dry friction moves by forces.
-  [[nodiscard]] bool acts() const { return !s_.engine.frictions.empty(); }
+  /// True where something with dry friction, or a law with corners, moves by forces.
+  [[nodiscard]] bool acts() const { return !s_.engine.frictions.empty() || !corners_.empty(); }
   /// Decides at the start, before Integrator::Start(): rates show what slides.
-  void FindSliding();
+  void FindSliding(const Step& first);
   /// Decides what rests at the start, after Integrator::Start().
   [[nodiscard]] RunSummary Begin();
   /// Takes a step with all its events, and its work.
   [[nodiscard]] RunSummary Advance(const Step& step);
+  /// Decides again where given forces have jumped or elements are switched; `next` begins there.
+  [[nodiscard]] RunSummary AfterJump(const Step& next);
 
  private:
   struct Event {
@@ -52,12 +57,19 @@ class StickSlip {
     std::vector<size_t> stops;
     std::vector<std::pair<size_t, int>> starts;  ///< elements and signs
   };
+  [[nodiscard]] RunSummary SwitchOver(const Step& step);
+  [[nodiscard]] bool IsOff(size_t element) const {
+    return std::ranges::binary_search(off_, element);
+  }
+  void FindDirection(size_t element);
   [[nodiscard]] RunSummary Go(double from_s, double h, bool multistep);
   [[nodiscard]] RunSummary LetGo(double t_s);
   [[nodiscard]] RunSummary Jump(double t_s);
   [[nodiscard]] RunSummary FindRates(const Event& event, double t_s);
   [[nodiscard]] RunSummary Apply(const Event& event, double t_s);
   [[nodiscard]] bool Ended() const;
+  [[nodiscard]] std::vector<int> Pieces() const;
+  [[nodiscard]] double CornerTime(const Integrator::Node& node, double from_s, double h);
   [[nodiscard]] bool Stopped(size_t element) const;
   /// Sign of a held element's acceleration, 0 where MuJoCo holds it.
   [[nodiscard]] int Started(size_t element) const;
@@ -77,6 +89,9 @@ class StickSlip {
   std::vector<int> sliding_;
   std::vector<char> fresh_;  ///< slides since the present node
   std::vector<size_t> friction_elements_;
+  std::vector<size_t> off_;      ///< switched off: they count as sliding, without a force
+  std::vector<size_t> corners_;  ///< elements whose law has corners
+  std::vector<int> pieces_;      ///< of these, at the present node
   std::vector<double> rates_;  ///< of these, by (1)
   RunSummary trouble_ = RunSummary::Done();
   int uniform_ = 4;  ///< nodes since the last event, as in Step
@@ -105,20 +120,58 @@ StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command
     if (HasFriction(elements[e]) && !s_.engine.elements[e].prescribed)
       friction_elements_.push_back(e);
   }
+  const bool moves_by_forces = s_.motion.free() || IsReleased(s_.engine);
+  for (size_t e = 0; e < elements.size() && moves_by_forces; ++e) {
+    if (HasCorners(elements[e])) corners_.push_back(e);
+  }
   sliding_.assign(elements.size(), 0);
   fresh_.assign(elements.size(), 0);
 }
 
-void StickSlip::FindSliding() {
-  for (const size_t e : friction_elements_) {
-    const double rate = ElementMotionOf(s_.system, e).rate;
-    const bool rests = std::abs(rate) <= kStopped * s_.engine.elements[e].rest_rate;
-    sliding_[e] = rests ? 0 : rate > 0.0 ? 1 : -1;
-  }
+void StickSlip::FindDirection(size_t e) {
+  const double rate = ElementMotionOf(s_.system, e).rate;
+  const bool rests = std::abs(rate) <= kStopped * s_.engine.elements[e].rest_rate;
+  sliding_[e] = IsOff(e) ? 1 : rests ? 0 : rate > 0.0 ? 1 : -1;
+}
+
+void StickSlip::FindSliding(const Step& first) {
+  off_ = SwitchedOff(s_.motion, first.from_s, s_.until(first.to_s));
+  for (const size_t e : friction_elements_) FindDirection(e);
   s_.system.SetSliding(sliding_);
 }
 
-RunSummary StickSlip::Begin() { return LetGo(0.0); }
+// Brakes and clutches that are switched on or off with this step.
+RunSummary StickSlip::SwitchOver(const Step& step) {
+  if (s_.motion.switches.empty()) return RunSummary::Done();
+  std::vector<size_t> off = SwitchedOff(s_.motion, step.from_s, s_.until(step.to_s));
+  return off == off_ ? RunSummary::Done() : AfterJump(step);
+}
+
+RunSummary StickSlip::Begin() {
+  pieces_ = Pieces();
+  return LetGo(0.0);
+}
+
+std::vector<int> StickSlip::Pieces() const {
+  std::vector<int> pieces;
+  for (const size_t e : corners_) {
+    const ElementMotion at = ElementMotionOf(s_.system, e);
+    pieces.push_back(PieceOf(s_.engine.mechanism->elements[e], at.position, at.rate));
+  }
+  return pieces;
+}
+
+// The first time found beyond which some law is on another piece, where one is at the end.
+double StickSlip::CornerTime(const Integrator::Node& node, double from_s, double h) {
+  double before = 0.0, beyond = h;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double t = 0.5 * (before + beyond);
+    integrator_.Restore(node);
+    if (RunSummary summary = Go(from_s, t, false); !summary.ok()) trouble_ = summary;
+    (Pieces() == pieces_ ? before : beyond) = t;
+  }
+  return beyond;
+}
 
 // The acceleration that counts as one.
 double StickSlip::Moving(size_t element) const {
@@ -131,7 +184,7 @@ double StickSlip::Moving(size_t element) const {
 }
 
 bool StickSlip::Stopped(size_t element) const {
-  return sliding_[element] * ElementMotionOf(s_.system, element).rate < 0.0;
+  return !IsOff(element) && sliding_[element] * ElementMotionOf(s_.system, element).rate < 0.0;
 }
 
 int StickSlip::Started(size_t element) const {
@@ -142,7 +195,7 @@ int StickSlip::Started(size_t element) const {
 }
 
 bool StickSlip::Ended() const {
-  return std::ranges::any_of(friction_elements_,
+  return Pieces() != pieces_ || std::ranges::any_of(friction_elements_,
                              [this](size_t e) { return Stopped(e) || Started(e) != 0; });
 }
 
@@ -164,6 +217,20 @@ RunSummary StickSlip::Jump(double t_s) {
   Commanded at;
   if (RunSummary summary = command_(t_s, &at); !summary.ok()) return summary;
   integrator_.EvaluateAgain(at, t_s);
+  return RunSummary::Done();
+}
+
+RunSummary StickSlip::AfterJump(const Step& next) {
+  const std::vector<size_t> before = off_;
+  off_ = SwitchedOff(s_.motion, next.from_s, s_.until(next.to_s));
+  for (const size_t e : friction_elements_) {
+    if (IsOff(e) != std::ranges::binary_search(before, e)) FindDirection(e);
+  }
+  s_.run->trace.breaks_s.push_back(next.from_s);
+  if (RunSummary summary = Jump(next.from_s); !summary.ok()) return summary;
+  if (RunSummary summary = LetGo(next.from_s); !summary.ok()) return summary;
+  s_.work.Jump(s_.WorkRates());
+  uniform_ = 0;
   return RunSummary::Done();
 }
 
@@ -231,7 +298,7 @@ RunSummary StickSlip::Apply(const Event& event, double t_s) {
       const size_t e = friction_elements_[k];
       const bool stops = std::ranges::find(event.stops, e) != event.stops.end();
       const bool slow = std::abs(rates_[k]) <= kStopped * s_.engine.elements[e].rest_rate;
-      if (stops || (slow && fresh_[e] == 0)) sliding_[e] = 0;
+      if (stops || (slow && fresh_[e] == 0 && !IsOff(e))) sliding_[e] = 0;
     }
   }
   for (const auto& [e, sign] : event.starts) {
@@ -306,6 +373,7 @@ RunSummary StickSlip::Find(const Integrator::Node& node, double from_s, double h
   }
   event->after_s = 2.0 * h;
   trouble_ = RunSummary::Done();
+  if (Pieces() != pieces_) event->after_s = CornerTime(node, from_s, h);
   for (const size_t e : stopped) {
     const double at = StopTime(node, e, from_s, h);
     if (at < event->after_s) *event = {.after_s = at, .stops = {e}, .starts = {}};
@@ -321,6 +389,7 @@ RunSummary StickSlip::Find(const Integrator::Node& node, double from_s, double h
 }
 
 RunSummary StickSlip::Advance(const Step& step) {
+  if (RunSummary summary = SwitchOver(step); !summary.ok()) return summary;
   double from = step.from_s;
   for (int events = 0; events < kMostEvents; ++events) {
     const double h = step.to_s - from;
@@ -344,6 +413,11 @@ RunSummary StickSlip::Advance(const Step& step) {
       from += event.after_s;
     } else if (RunSummary summary = Jump(from); !summary.ok()) {
       return summary;
+    }
+    pieces_ = Pieces();
+    if (event.stops.empty() && event.starts.empty()) {  // forces go on at a corner
+      uniform_ = 0;
+      continue;
     }
     s_.run->trace.breaks_s.push_back(from);
     if (RunSummary summary = Apply(event, from); !summary.ok()) return summary;
@@ -451,25 +525,28 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   // What is commanded is evaluated before the loop.
   const auto command = [&](double t_s, Commanded* at) {
     RunSummary summary = driven(t_s, &at->motion);
-    return summary.ok() && s->options.forces ? s->options.forces(t_s, &at->force) : summary;
+    return summary.ok() && s->options.forces ? s->options.forces(s->until(t_s), &at->force)
+                                             : summary;
   };
   std::vector<Commanded> ends(steps.size()), middles(steps.size());
   Commanded first;
   if (RunSummary summary = command(0.0, &first); !summary.ok()) return summary;
   for (size_t i = 0; i < steps.size(); ++i) {
+    s->until.StartFrom(steps[i].from_s);
     if (steps[i].uniform < 4) {
       const double middle = 0.5 * (steps[i].from_s + steps[i].to_s);
       if (RunSummary summary = command(middle, &middles[i]); !summary.ok()) return summary;
     }
     if (RunSummary summary = command(steps[i].to_s, &ends[i]); !summary.ok()) return summary;
   }
+  s->until.StartFrom(0.0);
   if (RunSummary summary = PutAtStart(s, first.motion); !summary.ok()) return summary;
   if (RunSummary summary = CheckStep(s); !summary.ok()) return summary;
   const double largest_gap = kApart * mjcf::Extent(*s->engine.mechanism);
   Integrator integrator(s, AdjustedStep(s->motion, s->options.step_s));
   StickSlip friction(s, &integrator, command);
   const LoopClock clock;
-  if (friction.acts()) friction.FindSliding();
+  if (friction.acts() && !steps.empty()) friction.FindSliding(steps.front());
   integrator.Start(first);
   if (friction.acts()) {
     if (RunSummary summary = friction.Begin(); !summary.ok()) return summary;
@@ -491,6 +568,19 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
     if (!s->loads.trouble().ok()) return s->loads.trouble();
     if (!integrator.healthy()) return Diverged(s, "the simulated motion diverged", step.to_s);
     if (!friction.acts()) s->work.Step(h, step.uniform == 4, s->WorkRates());
+    s->until.StartFrom(step.to_s);
+    if (s->until.IsJump(step.to_s)) {
+      Commanded after;
+      RunSummary summary = command(step.to_s, &after);
+      if (summary.ok() && friction.acts()) {
+        summary = friction.AfterJump(i + 1 < steps.size() ? steps[i + 1]
+                                                          : Step{step.to_s, step.to_s + h});
+      } else if (summary.ok()) {
+        integrator.EvaluateAgain(after, step.to_s);
+        s->work.Jump(s->WorkRates());
+      }
+      if (!summary.ok()) return summary;
+    }
     if (step.sample < 0) continue;
     s->Record(static_cast<size_t>(step.sample));
     if (RunSummary summary = CheckSample(s, largest_gap, step.to_s); !summary.ok()) return summary;

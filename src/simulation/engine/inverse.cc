@@ -29,7 +29,7 @@ RunSummary SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* t
   // The bodies know no armature.
   *tau += Eigen::Map<const VecX>(m->dof_armature, m->nv)
               .cwiseProduct(Eigen::Map<const VecX>(d->qacc, m->nv));
-  s->loads.Evaluate(t_s, *d);
+  s->EvaluateLoads(t_s);
   if (!s->loads.trouble().ok()) return s->loads.trouble();
   *tau = -*tau;
   s->loads.AddGeneralized(d, tau->data());

@@ -14,18 +14,15 @@ constexpr double kLoadSettled = 1e-14;
 // A share of a load that redundant constraints move; less is round-off.
 constexpr double kShifts = 1e-9;
 
-double PerLoad(const ForceElement& element) {
-  const auto* friction = std::get_if<FrictionLaw>(&element.law);
-  return friction == nullptr ? 0.0 : friction->per_load();
-}
-
 const ForceElement& ElementOf(const Session& s, size_t e) {
   return s.engine.mechanism->elements[e];
 }
 
-double LargestOf(const std::vector<Vec3>& forces) {
+double SizeOf(const BearingLoad& load) { return load.colwise().norm().sum(); }
+
+double LargestOf(const std::vector<BearingLoad>& loads) {
   double largest = 0.0;
-  for (const Vec3& force : forces) largest = std::max(largest, force.norm());
+  for (const BearingLoad& load : loads) largest = std::max(largest, SizeOf(load));
   return largest > 0.0 ? largest : 1.0;
 }
 
@@ -34,17 +31,18 @@ double LargestOf(const std::vector<Vec3>& forces) {
 std::vector<size_t> LoadedElements(const Mechanism& mechanism) {
   std::vector<size_t> loaded;
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
-    if (PerLoad(mechanism.elements[e]) > 0.0) loaded.push_back(e);
+    const auto* friction = std::get_if<FrictionLaw>(&mechanism.elements[e].law);
+    if (friction != nullptr && friction->by_load()) loaded.push_back(e);
   }
   return loaded;
 }
 
 VecX LoadFrictionOf(Session* session) {
   VecX sizes = VecX::Zero(static_cast<Eigen::Index>(session->engine.mechanism->elements.size()));
-  const std::vector<Vec3> across = session->recorder.ForcesAcross(session->loaded, session->loads);
-  for (size_t d = 0; d < across.size(); ++d) {
-    const size_t e = session->loaded[d];
-    sizes[static_cast<Eigen::Index>(e)] = PerLoad(ElementOf(*session, e)) * across[d].norm();
+  const std::vector<BearingLoad> loads =
+      session->recorder.LoadsOf(session->loaded, session->loads);
+  for (size_t d = 0; d < loads.size(); ++d) {
+    sizes[static_cast<Eigen::Index>(session->loaded[d])] = SizeOf(loads[d]);
   }
   return sizes;
 }
@@ -53,7 +51,7 @@ LoadFriction::LoadFriction(Session* session) : s_(*session) {
   if (s_.loaded.empty()) return;
   found_ = s_.system.force();
   if (s_.released) {
-    p_ = s_.recorder.ForcesAcross(s_.loaded, s_.loads);
+    p_ = s_.recorder.LoadsOf(s_.loaded, s_.loads);
     CheckUnique();
     return;
   }
@@ -78,15 +76,14 @@ LoadFriction::~LoadFriction() {
 // p, P and the constraint forces that belong to it.
 void LoadFriction::FindLoads() {
   const auto count = static_cast<Eigen::Index>(s_.loaded.size());
-  p_ = s_.recorder.ForcesAcross(s_.loaded, s_.loads);
-  P_.assign(s_.loaded.size(), std::vector<Vec3>(s_.loaded.size()));
+  p_ = s_.recorder.LoadsOf(s_.loaded, s_.loads);
+  P_.assign(s_.loaded.size(), std::vector<BearingLoad>(s_.loaded.size()));
   unit_.resize(found_.size(), count);
-  signed_c_.setZero(count);
+  sign_.setZero(count);
   for (size_t d = 0; d < s_.loaded.size(); ++d) {
     const size_t e = s_.loaded[d];
-    const double c = PerLoad(ElementOf(s_, e));
     const ElementMotion at = ElementMotionOf(s_.system, e);
-    if (!at.rests) signed_c_[static_cast<Eigen::Index>(d)] = std::copysign(c, at.rate);
+    if (!at.rests) sign_[static_cast<Eigen::Index>(d)] = std::copysign(1.0, at.rate);
     const VecX tau = -ElementGradient(s_.system, e);
     if (s_.shared) {
       s_.solver.SolveLeastDriven(tau);
@@ -94,12 +91,20 @@ void LoadFriction::FindLoads() {
       s_.solver.SolveForcesHere(tau);
     }
     unit_.col(static_cast<Eigen::Index>(d)) = s_.system.force();
-    const double size = c * LargestOf(p_);  // as it will be: differences keep their digits
-    s_.system.force() = found_ + size * unit_.col(static_cast<Eigen::Index>(d));
-    const std::vector<Vec3> moved = s_.recorder.ForcesAcross(s_.loaded, s_.loads);
-    for (size_t k = 0; k < moved.size(); ++k) P_[k][d] = (moved[k] - p_[k]) / size;
+    const double size = LargestOf(p_);  // as it will be: differences keep their digits
+    const double force = at.rests ? 0.0 : -size * sign_[static_cast<Eigen::Index>(d)];
+    s_.system.force() = found_ + force * unit_.col(static_cast<Eigen::Index>(d));
+    // The element's own force is in no reaction.
+    VecX own = VecX::Zero(static_cast<Eigen::Index>(s_.engine.mechanism->elements.size()));
+    own[static_cast<Eigen::Index>(e)] = size;
+    s_.system.SetLoadFriction(own);
+    const std::vector<BearingLoad> moved = s_.recorder.LoadsOf(s_.loaded, s_.loads);
+    for (size_t k = 0; k < moved.size(); ++k) {
+      P_[k][d] = at.rests ? BearingLoad(BearingLoad::Zero()) : BearingLoad((moved[k] - p_[k]) / force);
+    }
   }
   s_.system.force() = found_;
+  s_.system.SetLoadFriction({});
 }
 
 void LoadFriction::CheckUnique() {
@@ -107,12 +112,12 @@ void LoadFriction::CheckUnique() {
   const double size = found_.size() == 0 ? 1.0 : std::max(1.0, found_.cwiseAbs().maxCoeff());
   for (Eigen::Index k = 0; k < self_stress.cols(); ++k) {
     s_.system.force() = found_ + size * self_stress.col(k);
-    const std::vector<Vec3> moved = s_.recorder.ForcesAcross(s_.loaded, s_.loads);
+    const std::vector<BearingLoad> moved = s_.recorder.LoadsOf(s_.loaded, s_.loads);
+    const double shifts = kShifts * size * self_stress.col(k).cwiseAbs().maxCoeff();
     for (size_t e = 0; e < moved.size(); ++e) {
-      if ((moved[e] - p_[e]).norm() <= kShifts * size * self_stress.col(k).cwiseAbs().maxCoeff()) {
-        continue;
-      }
       const ForceElement& element = ElementOf(s_, s_.loaded[e]);
+      const double per_load = std::get<FrictionLaw>(element.law).per_load();
+      if (SizeOf(moved[e] - p_[e]) <= shifts * per_load) continue;
       s_.trouble = {.stop = Stop::kUnsupported,
                     .message = "redundant constraints share the load of the " +
                                Described(*s_.engine.mechanism, element) + " ('" + element.name +
@@ -124,30 +129,31 @@ void LoadFriction::CheckUnique() {
   s_.system.force() = found_;
 }
 
-// n_e − |p_e − Σ_d P_ed s_d c_d n_d| = 0.
+// S_e − |p_e − Σ_d P_ed s_d S_d| = 0.
 bool LoadFriction::SolveLoads() {
   const auto count = static_cast<Eigen::Index>(p_.size());
-  n_.resize(count);
-  for (Eigen::Index e = 0; e < count; ++e) n_[e] = p_[static_cast<size_t>(e)].norm();
+  S_.resize(count);
+  for (Eigen::Index e = 0; e < count; ++e) S_[e] = SizeOf(p_[static_cast<size_t>(e)]);
   VecX rest(count);
   MatX slope(count, count);
   for (int step = 0; step < kMostSteps; ++step) {
     for (Eigen::Index e = 0; e < count; ++e) {
       const auto k = static_cast<size_t>(e);
-      Vec3 v = p_[k];
+      BearingLoad v = p_[k];
       for (Eigen::Index d = 0; d < count; ++d)
-        v -= P_[k][static_cast<size_t>(d)] * signed_c_[d] * n_[d];
-      const Vec3 along = v.norm() > 0.0 ? Vec3(v.normalized()) : Vec3(Vec3::Zero());
-      rest[e] = n_[e] - v.norm();
+        v -= P_[k][static_cast<size_t>(d)] * sign_[d] * S_[d];
+      BearingLoad along = v;
+      for (int c = 0; c < 3; ++c) along.col(c).stableNormalize();  // zero stays zero
+      rest[e] = S_[e] - SizeOf(v);
       for (Eigen::Index d = 0; d < count; ++d) {
-        slope(e, d) =
-            (e == d ? 1.0 : 0.0) + along.dot(P_[k][static_cast<size_t>(d)]) * signed_c_[d];
+        slope(e, d) = (e == d ? 1.0 : 0.0) +
+                      along.cwiseProduct(P_[k][static_cast<size_t>(d)]).sum() * sign_[d];
       }
     }
     const VecX change = slope.partialPivLu().solve(rest);
-    n_ -= change;
-    if (change.cwiseAbs().maxCoeff() <= kLoadSettled * n_.cwiseAbs().maxCoeff()) {
-      return n_.minCoeff() >= 0.0;
+    S_ -= change;
+    if (change.cwiseAbs().maxCoeff() <= kLoadSettled * S_.cwiseAbs().maxCoeff()) {
+      return S_.minCoeff() >= 0.0;
     }
   }
   return false;
@@ -158,8 +164,8 @@ void LoadFriction::Apply() {
   VecX force = found_;
   for (size_t d = 0; d < s_.loaded.size(); ++d) {
     const auto k = static_cast<Eigen::Index>(d);
-    sizes[static_cast<Eigen::Index>(s_.loaded[d])] = PerLoad(ElementOf(s_, s_.loaded[d])) * n_[k];
-    force -= signed_c_[k] * n_[k] * unit_.col(k);
+    sizes[static_cast<Eigen::Index>(s_.loaded[d])] = S_[k];
+    force -= sign_[k] * S_[k] * unit_.col(k);
   }
   s_.system.force() = force;
   s_.system.SetLoadFriction(sizes);

@@ -1,11 +1,11 @@
-// Friction that grows with the joint's own reaction, on MuJoCo's forces.
+// Friction that grows with the joint's own reaction, or with a coupling's force, on MuJoCo's forces.
 //
-//   F_e = −c_e n_e sign q̇_e,  n_e = |p_e + Σ_d P_ed F_d|,  c = μ r                             (1)
-// p: reaction force across the axis without such friction, as the recorder reads it; P: what a unit
-// force F_d adds, with Jᵀλ = −u_d. Where the motion is commanded, friction changes forces only:
-// it is found where forces are recorded and is not applied. Newton on n. Where DOFs move by
-// forces, MuJoCo is loaded by (1) by the loads that it finds itself, until they no longer change
-// (Integrator::Settle); what rests breaks away beyond Fs + c n.
+//   F_e = −S_e sign q̇_e,  S_e = |p_e + Σ_d P_ed F_d|,  (1) of FrictionLaw                     (1)
+// p: loads of the bearings without such friction, as the recorder reads them (BearingLoad, |p| the
+// sum of its columns' lengths); P: what a unit force F_d adds, with Jᵀλ = −u_d. Where the motion is
+// commanded, friction changes forces only: it is found where forces are recorded and is not applied.
+// Newton on S. Where DOFs move by forces, MuJoCo is loaded by (1) by the loads that it finds itself,
+// until they no longer change (Integrator::Settle); what rests breaks away beyond Fs + S.
 #pragma once
 
 #include "simulation/engine/session.h"
@@ -15,7 +15,7 @@ namespace mbv::simulation {
 /// Indices of the elements with friction by load.
 [[nodiscard]] std::vector<size_t> LoadedElements(const Mechanism& mechanism);
 
-/// c_e n_e per force element, by the data's accelerations and constraint forces.
+/// S_e per force element, by the data's accelerations and constraint forces.
 [[nodiscard]] VecX LoadFrictionOf(Session* session);
 
 /// In commanded motion adds (1) to the session's constraint forces for as long as it lives. What
@@ -34,11 +34,11 @@ class LoadFriction {
   void Apply();
 
   Session& s_;
-  VecX found_;                        // constraint forces without
-  std::vector<Vec3> p_;               // per loaded element [N]
-  std::vector<std::vector<Vec3>> P_;  // [e][d]
-  MatX unit_;                         // constraint forces per unit of each
-  VecX signed_c_, n_;                 // sign q̇ c; loads [N]
+  VecX found_;                               // constraint forces without
+  std::vector<BearingLoad> p_;               // per loaded element [N or N m]
+  std::vector<std::vector<BearingLoad>> P_;  // [e][d]
+  MatX unit_;                                // constraint forces per unit of each
+  VecX sign_, S_;                            // of q̇; friction [N or N m]
 };
 
 // How several joints at rest share their load, where statics does not determine it.

@@ -1,6 +1,7 @@
 #include "simulation/engine/recorder.h"
 
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/demand.h"
@@ -56,8 +57,7 @@ void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates) 
     (*rates)[driven + 1] -= engine.mechanism->springs[s].damping * rate * rate;
   }
   for (size_t e = 0; e < engine.elements.size(); ++e) {
-    const ForceElement& element = engine.mechanism->elements[e];
-    if (Dissipates(element)) (*rates)[driven + 1] += PowerOf(element, ElementMotionOf(system, e));
+    (*rates)[driven + 1] += LostPowerOf(engine.mechanism->elements[e], ElementMotionOf(system, e));
   }
 }
 
@@ -80,9 +80,9 @@ void FindPowers(const ConstraintSystem& system, const Loads& loads, Powers* foun
   }
   for (size_t e = 0; e < engine.elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
-    const double put_in = PowerOf(element, ElementMotionOf(system, e));
-    if (std::holds_alternative<SpringLaw>(element.law)) power.springs += put_in;
-    if (std::holds_alternative<RotorLaw>(element.law)) power.rotors -= put_in;
+    const ElementMotion at = ElementMotionOf(system, e);
+    power.springs += SpringPowerOf(element, at);
+    if (std::holds_alternative<RotorLaw>(element.law)) power.rotors -= PowerOf(element, at);
   }
 }
 
@@ -605,19 +605,58 @@ Vec6 Recorder::ReactionOf(int j, const std::vector<Pose>& X_WB) const {
   return F_F;
 }
 
-std::vector<Vec3> Recorder::ForcesAcross(const std::vector<size_t>& elements, const Loads& loads) {
+std::vector<BearingLoad> Recorder::LoadsOf(const std::vector<size_t>& elements,
+                                           const Loads& loads) {
   std::vector<Pose> X_WB;
   BodyPoses(engine_, *system_->data(), &X_WB);
   system_->EvaluateBodyForces();
   TreeWrenches(loads);
-  std::vector<Vec3> forces;
+  std::vector<BearingLoad> bears;
   for (const size_t e : elements) {
-    const int j = engine_.mechanism->elements[e].joint;
-    const Vec3& a = engine_.mechanism->joints[static_cast<size_t>(j)].axis;
-    const Vec3 R = ReactionOf(j, X_WB).tail<3>();
-    forces.emplace_back(R - a.dot(R) * a);
+    const ForceElement& element = engine_.mechanism->elements[e];
+    const auto& law = std::get<FrictionLaw>(element.law);
+    BearingLoad& load = bears.emplace_back(BearingLoad::Zero());
+    if (law.coupling >= 0) {
+      const int row = system_->coupling_row(law.coupling);
+      load(0, 2) = system_->J().coeff(row, engine_.elements[e].dof) * system_->force()[row];
+    } else {
+      load = InBearings(*engine_.mechanism, element, ReactionOf(element.joint, X_WB), X_WB);
+    }
+    load *= system_->engaged(e) * law.coefficient;
   }
-  return forces;
+  return bears;
+}
+
+// Forces of the bearings times the radii at which they rub; `reaction`: [moment; force] in F.
+BearingLoad Recorder::InBearings(const Mechanism& mechanism, const ForceElement& element,
+                                 const Vec6& reaction, const std::vector<Pose>& X_WB) {
+  const auto& law = std::get<FrictionLaw>(element.law);
+  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  const Vec3 moment = reaction.head<3>(), force = reaction.tail<3>();
+  BearingLoad load = BearingLoad::Zero();
+  if (IsOfBall(joint.kind, element.coordinate)) {
+    load.col(0) = law.radius * force;
+    return load;
+  }
+  Vec3 axis = joint.axis;
+  if (joint.kind == JointKind::kUniversal && element.coordinate == 1) {
+    const Pose X_FM = (X_WB[static_cast<size_t>(joint.parent)] * joint.X_PF).inverse() *
+                      X_WB[static_cast<size_t>(joint.child)] * joint.X_CM;
+    axis = X_FM.linear() * joint.axis2;
+  }
+  const double thrust = axis.dot(force);
+  load(0, 2) = law.thrust_radius * thrust;
+  const Vec3 radial = force - thrust * axis;
+  if (law.length == std::numeric_limits<double>::infinity()) {
+    load.col(0) = law.radius * radial;
+    return load;
+  }
+  // At a distance of ℓ/2 either way along the axis: their sum is `radial`, and
+  // ℓ/2 axis × (one − other) the part of the moment across the axis.
+  const Vec3 difference = 2.0 / law.length * moment.cross(axis);
+  load.col(0) = 0.5 * law.radius * (radial + difference);
+  load.col(1) = 0.5 * law.radius * (radial - difference);
+  return load;
 }
 
 void Recorder::RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,

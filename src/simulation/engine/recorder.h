@@ -83,6 +83,10 @@ struct CoordinateRates {
 [[nodiscard]] CoordinateRates JointRatesOf(const EngineModel& engine, const mjData& d,
                                            const Joint& joint, int coordinate);
 
+/// What friction by load grows with, times its coefficient: the columns are loads of one and the
+/// other bearing times their radius, in F's axes, and the thrust times its or a coupling's force.
+using BearingLoad = Mat3;
+
 /// Expects positions, velocities (mj_comVel), accelerations qacc, body forces
 /// (ConstraintSystem::EvaluateBodyForces()) and constraint forces efc_force of one and the same
 /// instant in the system's data.
@@ -98,9 +102,9 @@ class Recorder {
   void Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row,
               std::vector<Pose>* X_WB);
 
-  /// Force across its joint's axis that the parent exerts on the child, per element, in F's axes,
-  /// by the data's accelerations and constraint forces. Evaluates the body forces.
-  [[nodiscard]] std::vector<Vec3> ForcesAcross(const std::vector<size_t>& elements,
+  /// Per element with friction by load, by the data's accelerations and constraint forces. Evaluates
+  /// the body forces.
+  [[nodiscard]] std::vector<BearingLoad> LoadsOf(const std::vector<size_t>& elements,
                                                const Loads& loads);
 
   /// True if there is dry friction.
@@ -132,6 +136,9 @@ class Recorder {
   void AddTendon(int tendon, double force);
   void AddElement(size_t e);
   [[nodiscard]] Vec6 ReactionOf(int joint, const std::vector<Pose>& X_WB) const;
+  [[nodiscard]] static BearingLoad InBearings(const Mechanism& mechanism,
+                                              const ForceElement& element, const Vec6& reaction,
+                                              const std::vector<Pose>& X_WB);
   [[nodiscard]] Vec6 ClosureWrench(int closure) const;
   [[nodiscard]] Vec6 AxisOfRound(const ElementPlace& place) const;
   void ExcludeDrives(int joint, double sign, Vec6* F_W) const;

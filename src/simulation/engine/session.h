@@ -132,6 +132,8 @@ struct Session {
   void FindShared();
   /// Loads, given drive forces and force elements that MuJoCo lacks at t, for the data's current
   /// position and velocity, into qfrc_applied; forces of servos into qfrc_actuator.
+  /// Loads, and what is switched, at t.
+  void EvaluateLoads(double t_s);
   void ApplyForces(double t_s, const Commanded& at);
 
   const EngineModel engine;
@@ -145,6 +147,7 @@ struct Session {
   Loads loads;
   Recorder recorder;
   WorkMeter work;
+  UntilJump until;  ///< at which time forces are evaluated
   const bool released;  ///< the motion of some drive is not prescribed: friction and accelerations
                         ///< are MuJoCo's
   const std::vector<size_t> loaded;         ///< elements with friction by their joint's load

@@ -53,6 +53,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       spins(&system),
       loads(engine, motion_),
       recorder(&system, motion_.RecordedJoints(), Integrates(options_)),
+      until(motion_),
       released(motion_.free() || IsReleased(engine)),
       loaded(LoadedElements(*engine.mechanism)),
       lacking(HasLacking(*engine.mechanism)),
@@ -152,8 +153,17 @@ VecX HomePositions(const EngineModel& engine) {
   return home;
 }
 
-void Session::ApplyForces(double t_s, const Commanded& at) {
+void Session::EvaluateLoads(double t_s) {
   loads.Evaluate(t_s, *data);
+  if (motion.switches.empty()) return;
+  CommandSample now;
+  EvaluateMotion(motion, t_s, &now);
+  system.SetEngaged(std::move(now.engaged));
+}
+
+void Session::ApplyForces(double t_s, const Commanded& at) {
+  t_s = until(t_s);
+  EvaluateLoads(t_s);
   if (loads.world().empty() && !system.has_given_forces() && !lacking) return;
   mju_zero(data->qfrc_applied, engine.m->nv);
   loads.AddGeneralized(data.get(), data->qfrc_applied);

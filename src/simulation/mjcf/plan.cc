@@ -374,7 +374,7 @@ PlannedForces SumOf(const Mechanism& mechanism, const Acts& acts) {
 }  // namespace
 
 bool IsPlanned(const ForceElement& element) {
-  if (element.bushing >= 0 || IsGyroscopic(element)) return false;
+  if (element.bushing >= 0 || element.spring >= 0 || IsGyroscopic(element)) return false;
   if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
     return IsPlannedSpring(element, *spring);
   }
@@ -387,7 +387,7 @@ bool IsPlainFriction(const Mechanism& mechanism, const ForceElement& element) {
   if (law == nullptr || element.joint < 0 || element.bushing >= 0) return false;
   const JointKind kind = mechanism.joints[static_cast<size_t>(element.joint)].kind;
   const bool scalar = kind != JointKind::kFree && !IsOfBall(kind, element.coordinate);
-  return scalar && law->breakaway == law->coulomb && law->per_load() == 0.0;
+  return scalar && law->breakaway == law->coulomb && !law->by_load();
 }
 
 PlannedForces ForcesOfJoint(const Mechanism& mechanism, int joint, int coordinate) {
