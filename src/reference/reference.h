@@ -45,7 +45,8 @@ struct ReferenceSample {
   VecX prescribed_force;  ///< per prescribed joint
   MatX reactions;         ///< joints × 6: [fx fy fz mx my mz] as ReactionChannels() defines
   MatX outputs;           ///< outputs × 6
-  DrivenSample joints;    ///< Motion::RecordedJoints()
+  MatX output_velocity, output_acceleration;  ///< their time derivatives, outputs × 6
+  DrivenSample joints;                        ///< Motion::RecordedJoints()
   /// Per force element, of those with dry friction: sign of the rate, 0 at rest (RestRate()).
   std::vector<int> friction_signs;
   /// Per force element: friction by its joint's load, μ r N; empty where none depends on it.

@@ -56,10 +56,15 @@ void SampleRecorder::RecordDriven(ReferenceSample* sample) {
 void SampleRecorder::RecordOutputs(ReferenceSample* sample) {
   const auto count = static_cast<Eigen::Index>(mechanism_.outputs.size());
   if (last_outputs_.rows() != count) last_outputs_.setZero(count, 6);
+  sample->output_velocity.resize(count, 6);
+  sample->output_acceleration.resize(count, 6);
   for (Eigen::Index i = 0; i < count; ++i) {
     for (int c = 0; c < 6; ++c) {
-      last_outputs_(i, c) =
-          OutputRow(mechanism_.outputs[i], c, sample->states, last_outputs_(i, c)).value;
+      const ScalarRow row =
+          OutputRow(mechanism_.outputs[i], c, sample->states, last_outputs_(i, c));
+      last_outputs_(i, c) = row.value;
+      sample->output_velocity(i, c) = RateOf(row, sample->states.V_WB);
+      sample->output_acceleration(i, c) = RateOf(row, sample->states.A_WB) + row.bias;
     }
   }
   sample->outputs = last_outputs_;
@@ -72,6 +77,9 @@ std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, const Motion&
     channels.insert(channels.end(), more.begin(), more.end());
   };
   append(OutputChannels(mechanism));
+  if (motion.free()) {
+    for (const Output& output : mechanism.outputs) append(OutputRateChannels(mechanism, output));
+  }
   append(PrescribedChannels(mechanism));
   append(BandChannels(mechanism));
   if (reactions) {
@@ -120,8 +128,8 @@ void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample, cons
     row[columns(quantity, static_cast<size_t>(k))] = value;
   };
   // Six components per subject.
-  const auto put_rows = [&](Quantity quantity, const MatX& table, size_t rows) {
-    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows); ++i) {
+  const auto put_rows = [&](Quantity quantity, const MatX& table, Eigen::Index rows) {
+    for (Eigen::Index i = 0; i < rows; ++i) {
       for (Eigen::Index c = 0; c < 6; ++c) put(quantity, 6 * i + c, table(i, c));
     }
   };
@@ -131,7 +139,12 @@ void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample, cons
     put(Quantity::kAcceleration, d, sample.driven.acceleration[d]);
     put(Quantity::kForce, d, sample.drive_force[d]);
   }
-  put_rows(Quantity::kPose, sample.outputs, mechanism.outputs.size());
+  put_rows(Quantity::kPose, sample.outputs, sample.outputs.rows());
+  if (columns.Has(Quantity::kPoseVelocity)) {
+    put_rows(Quantity::kPoseVelocity, sample.output_velocity, sample.output_velocity.rows());
+    put_rows(Quantity::kPoseAcceleration, sample.output_acceleration,
+             sample.output_acceleration.rows());
+  }
   for (Eigen::Index k = 0; k < sample.joints.position.size(); ++k) {
     put(Quantity::kJointPosition, k, sample.joints.position[k]);
     put(Quantity::kJointVelocity, k, sample.joints.velocity[k]);
@@ -144,7 +157,8 @@ void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample, cons
     WriteBands(sample, columns, row);
   }
   if (columns.Has(Quantity::kReaction)) {
-    put_rows(Quantity::kReaction, sample.reactions, mechanism.joints.size());
+    const auto joints = static_cast<Eigen::Index>(mechanism.joints.size());
+    put_rows(Quantity::kReaction, sample.reactions, joints);
   }
   put(Quantity::kLoopGap, 0, sample.closure_position_m);
   put(Quantity::kLoopTwist, 0, sample.closure_rotation_rad);

@@ -19,7 +19,8 @@ constexpr double kBytesPerMb = 1e6;
 constexpr size_t kMostLog = 200;  // characters of what a program said last
 constexpr const char* kLog = "log";
 
-constexpr const char* kInstalled[] = {"mbverify-witness-simbody", "mbverify-witness-mujoco"};
+constexpr const char* kInstalled[] = {"mbverify-witness-simbody", "mbverify-witness-ode",
+                                      "mbverify-witness-mujoco"};
 
 fs::path FolderOfMbverify() { return ProgramFile().parent_path(); }
 

@@ -286,6 +286,10 @@ TEST(Forward, AFloatingBodyFliesAParabolaAndKeepsItsSpin) {
   EXPECT_NEAR(At(run.trace, last, "body.x"), 0.15, kIntegrated);
   EXPECT_NEAR(At(run.trace, last, "body.z"), 2.0 - 0.5 * 9.81 * 0.25, kIntegrated);
   EXPECT_NEAR(At(run.trace, last, "body.yaw"), 1.0, kIntegrated);
+  EXPECT_NEAR(At(run.trace, last, "body.x.velocity"), 0.3, kIntegrated);
+  EXPECT_NEAR(At(run.trace, last, "body.z.velocity"), 4.0 - 9.81 * 0.5, kIntegrated);
+  EXPECT_NEAR(At(run.trace, last, "body.yaw.velocity"), 2.0, kIntegrated);
+  EXPECT_NEAR(At(run.trace, last, "body.z.acceleration"), -9.81, kIntegrated);
   const VecX energy = ColumnOf(run.trace, "energy.kinetic") + ColumnOf(run.trace, "energy.gravity");
   EXPECT_LT((energy.array() - energy[0]).abs().maxCoeff(), kIntegrated);
 }

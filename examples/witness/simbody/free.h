@@ -23,6 +23,7 @@ class FreeMotion : Model {
       out << ',' << push.name << ".position," << push.name << ".velocity," << push.name
           << ".acceleration";
     }
+    NameOutputRates(&out);
     NameOutputs(&out);
     SimTK::RungeKuttaMersonIntegrator integrator(system_);
     integrator.setAccuracy(kAccuracy);
@@ -40,6 +41,7 @@ class FreeMotion : Model {
         out << ',' << push.Position(now) << ',' << push.Velocity(now) << ','
             << push.Acceleration(now);
       }
+      WriteOutputRates(now, &out);
       WriteOutputs(now, &out);
     }
   }
@@ -61,23 +63,9 @@ class FreeMotion : Model {
         push.coordinate = CoordinateUnder(drive);
         push.mobilizer = matter_.getMobilizedBody(MobilizerUnder(drive));
       }
-      ReadForce(forces, &push);
+      push.force = ForceInTime(forces, push.name);
     }
     SimTK::Force::Custom(forces_, new Pushes(&pushes_));
-  }
-
-  static void ReadForce(const Table& forces, Push* push) {
-    size_t column = 0;
-    for (size_t k = 1; k < forces.names.size(); ++k) {
-      if (forces.names[k] == push->name + ".force") column = k;
-    }
-    for (const std::vector<std::string>& row : forces.rows) {
-      Sample at;
-      if (column > 0)
-        at = {std::stod(row.at(column)), std::stod(row.at(column + 1)),
-              std::stod(row.at(column + 2))};
-      push->force.Add(std::stod(row.at(0)), at);
-    }
   }
 
   // A body's pose and velocity [ω; v of its origin] in ground.

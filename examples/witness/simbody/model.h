@@ -103,6 +103,27 @@ class Model {
     *out << '\n';
   }
 
+  void NameOutputRates(std::ofstream* out) const {
+    for (const json& output : m_.at("outputs")) {
+      for (const char* what : {"x.velocity", "y.velocity", "z.velocity", "x.acceleration",
+                               "y.acceleration", "z.acceleration"})
+        *out << ',' << output.at("name").get<std::string>() << '.' << what;
+    }
+  }
+
+  // Of each output's origin, in its reference frame; of a state with accelerations.
+  void WriteOutputRates(const State& state, std::ofstream* out) {
+    for (const json& output : m_.at("outputs")) {
+      const json &reference = output.at("reference"), &frame = output.at("frame");
+      const MobilizedBody &in = At(reference.at("body")), &body = At(frame.at("body"));
+      const Vec3 p = PoseOf(frame).p();
+      const Rotation R = PoseOf(reference).R();
+      const Vec3 v = ~R * body.findStationVelocityInAnotherBody(state, p, in);
+      const Vec3 a = ~R * body.findStationAccelerationInAnotherBody(state, p, in);
+      for (const Vec3& x : {v, a}) *out << ',' << x[0] << ',' << x[1] << ',' << x[2];
+    }
+  }
+
   MobilizedBody& At(const std::string& body) {
     return matter_.updMobilizedBody(SimTK::MobilizedBodyIndex(placed_.at(body)));
   }

@@ -39,29 +39,6 @@ struct Leg {
   }
 };
 
-// A force over time: quintic polynomials through values, rates and second derivatives at samples.
-class ForceInTime {
- public:
-  void Add(double t, const Sample& sample) { samples_.emplace_back(t, sample); }
-
-  [[nodiscard]] double At(double t) const {
-    size_t i = 0;
-    while (i + 2 < samples_.size() && samples_[i + 1].first <= t) ++i;
-    const auto& [t0, a] = samples_[i];
-    const auto& [t1, b] = samples_[std::min(i + 1, samples_.size() - 1)];
-    const double h = t1 - t0;
-    if (!(h > 0.0)) return a.position;
-    const double s = (t - t0) / h, v0 = a.velocity * h, v1 = b.velocity * h;
-    const double a0 = a.acceleration * h * h, a1 = b.acceleration * h * h;
-    const double d = b.position - a.position - v0 - a0 / 2, e = v1 - v0 - a0, f = a1 - a0;
-    const double c3 = 10 * d - 4 * e + f / 2, c4 = -15 * d + 7 * e - f, c5 = 6 * d - 3 * e + f / 2;
-    return a.position + s * (v0 + s * (a0 / 2 + s * (c3 + s * (c4 + s * c5))));
-  }
-
- private:
-  std::vector<std::pair<double, Sample>> samples_;
-};
-
 // A drive that pushes in a free motion: along a leg, or on a mobilizer's coordinate.
 struct Push {
   std::string name;

@@ -21,6 +21,7 @@ constexpr const char* kReference = "reference";
 constexpr const char* kSimulation = "simulation";
 constexpr const char* kMujoco = "mujoco";
 constexpr const char* kMujocoDefault = "mujoco_default";
+constexpr const char* kMujocoRk4 = "mujoco_rk4";
 
 // A computed trace, or why there is none.
 struct Computed {
@@ -57,19 +58,29 @@ Eigen::Index RowAt(const Trace& trace, double time_s) {
   return next - trace.time_s.begin();
 }
 
-// Computed less published, by instant; NaN where the trace has none. Angles of a pose are the same
-// after a turn; those of drives count their turns.
-std::vector<double> DifferencesOf(const PublishedSeries& series, const Trace& trace) {
-  std::vector<double> differences(series.time_s.size(), kNan);
+// What a trace has of a series, by instant; NaN where it has nothing.
+std::vector<double> ComputedValues(const PublishedSeries& series, const Trace& trace) {
+  std::vector<double> values(series.time_s.size(), kNan);
   const int column = trace.Find(series.channel);
-  if (column < 0) return differences;
-  const Channel& channel = trace.channels[static_cast<size_t>(column)];
-  const bool angle = channel.quantity == Quantity::kPose && channel.component >= 3;
-  for (size_t k = 0; k < differences.size(); ++k) {
+  if (column < 0) return values;
+  for (size_t k = 0; k < values.size(); ++k) {
     const Eigen::Index row = RowAt(trace, series.time_s[k]);
-    if (row < 0) continue;
-    const double value = trace.values(row, column);
-    differences[k] = angle ? AngleDifference(value, series.values[k]) : value - series.values[k];
+    if (row >= 0) values[k] = trace.values(row, column);
+  }
+  return values;
+}
+
+// Computed less published, by instant. Angles of a pose are the same after a turn; those of drives
+// count their turns.
+std::vector<double> DifferencesOf(const PublishedSeries& series, const Trace& trace,
+                                  const std::vector<double>& computed) {
+  const int column = trace.Find(series.channel);
+  const Channel channel = column < 0 ? Channel() : trace.channels[static_cast<size_t>(column)];
+  const bool angle = channel.quantity == Quantity::kPose && channel.component >= 3;
+  std::vector<double> differences;
+  for (size_t k = 0; k < computed.size(); ++k) {
+    differences.push_back(angle ? AngleDifference(computed[k], series.values[k])
+                                : computed[k] - series.values[k]);
   }
   return differences;
 }
@@ -134,9 +145,10 @@ class CaseRun {
                         runner_.runs().Find(prepared_.driver())->summary.ok();
     const bool steps = prepared_.scenario.simulation.mode != DriveMode::kInverse;
     const bool within = driven && runner_.CheckStrokes();
+    const Motion& motion = prepared_.scenario.motion;
     for (const auto& [name, engine] :
          {std::pair(kSimulation, Engine::kCorrected), std::pair(kMujoco, Engine::kStock),
-          std::pair(kMujocoDefault, Engine::kDefaults)}) {
+          std::pair(kMujocoRk4, Engine::kStock), std::pair(kMujocoDefault, Engine::kDefaults)}) {
       if (!Wants(name)) continue;
       Simulated& simulated = simulations_.emplace_back();
       simulated.name = name;
@@ -144,8 +156,13 @@ class CaseRun {
         simulated.why = driven ? "the drives cannot go there" : "there is no drive motion";
       } else if (!steps && engine != Engine::kCorrected) {
         simulated.why = "the motion is evaluated by inverse dynamics and not stepped";
+      } else if (simulated.name == kMujocoRk4 && (!motion.free() || !motion.commands.empty())) {
+        simulated.why = "its targets stand still within a step: it is for motions without commands";
       } else {
-        SimulatedWitness witness = runner_.Simulate(engine, name);
+        SimulationOptions options = OptionsOf(prepared_.scenario, prepared_.base, engine);
+        options.runge_kutta = simulated.name == kMujocoRk4;
+        SimulatedWitness witness =
+            options.runge_kutta ? runner_.Simulate(options, name) : runner_.Simulate(engine, name);
         if (!witness.run.summary.ok()) simulated.why = witness.run.summary.message;
         simulated.run = std::move(witness.run);
       }
@@ -193,7 +210,8 @@ class CaseRun {
       const Trace& trace = *computed.trace;
       for (size_t k = 0; k < benchmark_.published.size(); ++k) {
         const PublishedSeries& series = benchmark_.published[k];
-        std::vector<double> differences = DifferencesOf(series, trace);
+        row.computed.push_back(ComputedValues(series, trace));
+        std::vector<double> differences = DifferencesOf(series, trace, row.computed.back());
         row.series.push_back(ErrorOf(series, differences));
         if (Judges(row.engine) && std::isfinite(row.series.back().largest)) {
           judged[k].push_back(std::move(differences));
@@ -264,8 +282,12 @@ const std::vector<BenchmarkEngine>& BenchmarkEngines() {
       {.name = kReference, .about = "the generic reference", .judges = true},
       {.name = kSimulation, .about = "MuJoCo 2.2.2 with the terms that it omits", .judges = true},
       {.name = kMujoco, .about = "MuJoCo 2.2.2 by the best settings that a user can choose"},
+      {.name = kMujocoRk4, .about = "MuJoCo 2.2.2 by those settings and its Runge–Kutta method"},
       {.name = kMujocoDefault, .about = "MuJoCo 2.2.2 with its default settings"},
       {.name = "simbody", .about = "Simbody", .command = "mbverify-witness-simbody"},
+      {.name = "ode",
+       .about = "the Open Dynamics Engine by its default settings",
+       .command = "mbverify-witness-ode"},
       {.name = "mujoco_newest",
        .about = "the newest MuJoCo by the best settings",
        .command = "mbverify-witness-mujoco"},
@@ -383,6 +405,9 @@ BenchmarkResult RunBenchmarkCase(const BenchmarkCase& benchmark,
     return result;
   }
   prepared->scenario.simulation.step_s *= step_factor;
+  result.settings = fmt::format(
+      "steps of {:g} s, a sample every {:g} s, {:g} s in all", prepared->scenario.simulation.step_s,
+      prepared->scenario.motion.sample_s, prepared->scenario.motion.duration_s);
   CaseRun(benchmark, engines, &*prepared).Run(&result);
   return result;
 }

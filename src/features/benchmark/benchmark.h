@@ -73,6 +73,7 @@ struct EngineOnCase {
   std::string engine, program;      ///< program: of an external witness, as it calls itself
   std::string why;                  ///< why it gives nothing; "" if it computed the case
   std::vector<SeriesError> series;  ///< of the case's published series
+  std::vector<std::vector<double>> computed;  ///< by series, at its instants; NaN: not recorded
   double motion = kNan;     ///< largest error of drives and outputs [rad, characteristic lengths]
   double force = kNan;      ///< all drive forces, RMS error over RMS
   double reaction = kNan;   ///< all unique joint reactions, RMS error over RMS
@@ -95,7 +96,8 @@ enum class CaseVerdict {
 struct BenchmarkResult {
   std::string name, suite, title;
   CaseVerdict verdict = CaseVerdict::kNotRun;
-  std::string reason = {};  ///< one sentence
+  std::string reason = {};    ///< one sentence
+  std::string settings = {};  ///< step, samples and duration
   std::vector<EngineOnCase> engines = {};
 };
 
@@ -135,7 +137,12 @@ struct Benchmark {
 /// The ranking, and errors by case and engine.
 [[nodiscard]] std::string ToLatex(const Benchmark& benchmark);
 [[nodiscard]] std::string ToMarkdown(const Benchmark& benchmark);
+/// Each number leads to its case's page, CasePage() below cases/.
 [[nodiscard]] std::string ToHtml(const Benchmark& benchmark);
+/// The run of one case: source, settings, engines, errors by series, and where they are largest.
+[[nodiscard]] std::string CasePage(const Benchmark& benchmark, size_t index);
+/// A row a published value: signal, time_s, published, uncertainty, then what each engine computed.
+[[nodiscard]] std::string CaseCsv(const Benchmark& benchmark, size_t index);
 /// `schema: mbverify.benchmark/1`.
 [[nodiscard]] nlohmann::ordered_json ToJson(const Benchmark& benchmark);
 
@@ -147,13 +154,14 @@ void VisitMembers(Visit& visit, typename Visit::template Of<SeriesError>& error)
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<EngineOnCase>& engine) {
   visit(engine.engine), visit(engine.program), visit(engine.why), visit(engine.series);
+  visit(engine.computed);
   visit(engine.motion), visit(engine.force), visit(engine.reaction), visit(engine.closure_m);
   visit(engine.energy), visit(engine.cpu_s);
 }
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<BenchmarkResult>& result) {
   visit(result.name), visit(result.suite), visit(result.title), visit(result.verdict);
-  visit(result.reason), visit(result.engines);
+  visit(result.reason), visit(result.settings), visit(result.engines);
 }
 
 }  // namespace mbv

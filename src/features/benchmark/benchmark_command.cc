@@ -1,11 +1,14 @@
 // `mbverify benchmark` as a user types it.
 #include <fmt/format.h>
 #include <algorithm>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "base/inputs.h"
+#include "base/json_text.h"
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "base/worker_pool.h"
@@ -16,7 +19,10 @@
 #include "features/benchmark/benchmark.h"
 #include "features/engines/crosscheck.h"
 #include "math/bytes.h"
+#include "math/resume.h"
 #include "scenario/find_model.h"
+#include "scenario/load_scenario.h"
+#include "verify/version.h"
 
 namespace mbv {
 namespace {
@@ -26,6 +32,7 @@ struct BenchmarkArguments {
   std::vector<double> steps;
   std::string out = "out", markdown;
   int jobs = AllCores();
+  bool resume = false;
   JsonOption json;
 };
 
@@ -60,28 +67,53 @@ std::vector<BenchmarkEngine> EnginesOf(const std::vector<std::string>& words) {
   return engines;
 }
 
-// Each case in a process of its own: what one of them does harms no other.
-std::vector<BenchmarkResult> RunAll(const Benchmark& benchmark,
-                                    const std::vector<BenchmarkEngine>& engines, double step_factor,
-                                    const std::string& what, int jobs) {
+// Of all that results depend on: versions, engines, cases and what they read.
+std::string IdentityOf(const Benchmark& benchmark, const std::vector<InputFile>& inputs) {
+  Fingerprint sum;
+  for (const auto& [name, version] : Versions()) sum.Add(name + " " + version);
+  for (const BenchmarkEngine& engine : benchmark.engines) {
+    sum.Add(engine.name + "=" + engine.command);
+  }
+  for (const BenchmarkCase& one : benchmark.cases) sum.Add(one.name);
+  for (const InputFile& input : inputs) sum.Add(input.fingerprint);
+  return sum.Text();
+}
+
+// Each case in a process of its own: what one of them does harms no other. What `log` has of a run
+// before is not computed again; behind a case that did not end by itself nothing is kept.
+std::vector<BenchmarkResult> RunAll(const Benchmark& benchmark, double step_factor,
+                                    const std::string& what, int jobs, ResultLog log) {
   constexpr double kLongestCase_s = 300.0;
   const std::vector<BenchmarkCase>& cases = benchmark.cases;
   std::vector<BenchmarkResult> results;
+  while (results.size() < cases.size()) {
+    auto kept = log.Kept<BenchmarkResult>();
+    if (!kept) break;
+    results.push_back(*std::move(kept));
+  }
+  const size_t first = results.size();
+  bool keeps = true;
   ProgressLine progress(true);
   StreamFromChildren(
-      cases.size(), {.parallel = jobs, .timeout_s = kLongestCase_s},
-      [&](size_t k) { return ToBytes(RunBenchmarkCase(cases[k], engines, step_factor)); },
+      cases.size() - first, {.parallel = jobs, .timeout_s = kLongestCase_s},
+      [&](size_t k) {
+        return ToBytes(RunBenchmarkCase(cases[first + k], benchmark.engines, step_factor));
+      },
       [&](size_t k, const std::optional<std::string>& bytes) {
+        const BenchmarkCase& one = cases[first + k];
         auto result = bytes ? FromBytes<BenchmarkResult>(*bytes) : std::nullopt;
+        keeps = keeps && result;
+        if (keeps) log.Keep(*result);
         if (!result) {
           result = BenchmarkResult{
-              .name = cases[k].name,
-              .suite = cases[k].suite,
-              .title = cases[k].title,
+              .name = one.name,
+              .suite = one.suite,
+              .title = one.title,
               .reason = fmt::format("ended by a crash, or not within {:g} s", kLongestCase_s)};
         }
         results.push_back(std::move(*result));
-        progress.Show(what, static_cast<double>(k + 1) / static_cast<double>(cases.size()));
+        progress.Show(what,
+                      static_cast<double>(results.size()) / static_cast<double>(cases.size()));
         return true;
       });
   return results;
@@ -90,6 +122,7 @@ std::vector<BenchmarkResult> RunAll(const Benchmark& benchmark,
 int RunBenchmark(const BenchmarkArguments& arguments) {
   Benchmark benchmark;
   Diagnostics diagnostics;
+  const InputWatch watch;
   benchmark.cases = ReadBenchmarkCases(PathsOf(arguments.paths), &diagnostics);
   FindingPrinter(stderr).Print(diagnostics);
   if (diagnostics.has_errors()) return 2;
@@ -108,24 +141,40 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
   }
   benchmark.engines = EnginesOf(arguments.engines);
   if (benchmark.engines.empty()) return 2;
-  benchmark.results = RunAll(benchmark, benchmark.engines, 1.0, "cases", arguments.jobs);
+  for (const BenchmarkCase& one : benchmark.cases) {
+    if (!one.scenario.empty()) (void)LoadScenario(one.scenario);
+  }
+  ResumeFolder folder(std::filesystem::path(arguments.out) / "benchmark.part",
+                      IdentityOf(benchmark, watch.files()));
+  if (folder.taken()) {
+    return Refuse("another process computes a benchmark there", "choose another folder with --out");
+  }
+  if (!arguments.resume) folder.Forget();
+  if (folder.resumes()) Say(stderr, "goes on with what an interrupted run left\n");
+  benchmark.results = RunAll(benchmark, 1.0, "cases", arguments.jobs, folder.Log("cases"));
   for (const double step : arguments.steps) {
-    benchmark.at_steps.emplace_back(step, RunAll(benchmark, benchmark.engines, step,
-                                                 fmt::format("{:g} steps", step), arguments.jobs));
+    const std::string name = fmt::format("{:g} steps", step);
+    benchmark.at_steps.emplace_back(
+        step, RunAll(benchmark, step, name, arguments.jobs, folder.Log(name)));
+  }
+  const std::string json = arguments.json.Text(ToJson(benchmark));
+  std::vector<std::pair<std::string, std::string>> files = {{"benchmark.html", ToHtml(benchmark)},
+                                                            {"errors.csv", ErrorsCsv(benchmark)},
+                                                            {"cost.csv", CostCsv(benchmark)},
+                                                            {"tables.tex", ToLatex(benchmark)},
+                                                            {"benchmark.json", json}};
+  for (size_t k = 0; k < benchmark.cases.size(); ++k) {
+    const std::string name = "cases/" + benchmark.cases[k].name;
+    files.emplace_back(name + ".html", CasePage(benchmark, k));
+    files.emplace_back(name + ".csv", CaseCsv(benchmark, k));
   }
   std::FILE* to = arguments.json.text();
   SayText(to, ToText(benchmark, WantsColor(to), TerminalColumns(to)));
-  const std::string json = arguments.json.Text(ToJson(benchmark));
-  OutputFolder folder(arguments.out, "benchmark");
-  if (const std::string trouble = folder.WriteAll({{"benchmark.html", ToHtml(benchmark)},
-                                                   {"errors.csv", ErrorsCsv(benchmark)},
-                                                   {"cost.csv", CostCsv(benchmark)},
-                                                   {"tables.tex", ToLatex(benchmark)},
-                                                   {"benchmark.json", json}});
-      !trouble.empty()) {
+  OutputFolder target(arguments.out, "benchmark");
+  if (const std::string trouble = target.WriteAll(files); !trouble.empty()) {
     return NotWritten(trouble, "choose another folder with --out");
   }
-  Say(stderr, "results in {}\n", folder.target().string());
+  Say(stderr, "results in {}\n", target.target().string());
   int exit_code = WorseExit(benchmark.exit_code(), arguments.json.Write(json, {}));
   if (!arguments.markdown.empty()) {
     exit_code = WorseExit(exit_code, WriteWholeFile(arguments.markdown, ToMarkdown(benchmark), {}));
@@ -155,6 +204,7 @@ void AddBenchmarkCommand(CLI::App* app, int* exit_code) {
       ->delimiter(',')
       ->check(Positive());
   benchmark->add_option("--out", arguments->out, "folder for results")->capture_default_str();
+  benchmark->add_flag("--resume", arguments->resume, "go on with what an interrupted run left");
   benchmark->add_option("--jobs", arguments->jobs, "cases at once")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();

@@ -5,12 +5,14 @@
 #include <map>
 #include <set>
 
+#include "base/files.h"
 #include "base/json_text.h"
 #include "base/text.h"
 #include "features/benchmark/benchmark.h"
 #include "plot/svg_plot.h"
 #include "report/document.h"
 #include "report/page.h"
+#include "verify/version.h"
 
 namespace mbv {
 namespace {
@@ -67,6 +69,16 @@ Rank RankOf(const Benchmark& benchmark, const std::string& engine) {
   return rank;
 }
 
+std::string PageOf(const std::string& name) { return "cases/" + name + ".html"; }
+
+// A cell that leads to the page of its case.
+Cell ToCase(Cell cell, const std::string& name) {
+  const std::string text = Escape(cell.text);
+  cell.html = fmt::format("<a href=\"{}\">{}</a>", Escape(PageOf(name)),
+                          cell.code ? "<code>" + text + "</code>" : text);
+  return cell;
+}
+
 Table RankingTable(const Benchmark& benchmark) {
   Table table{.name = "engines",
               .caption =
@@ -104,9 +116,10 @@ Table CaseTable(const Benchmark& benchmark) {
       .columns = {Text("case"), Text("suite"), Digits("series"), Text("verdict"), Wide("why")}};
   for (size_t k = 0; k < benchmark.results.size(); ++k) {
     const BenchmarkResult& result = benchmark.results[k];
-    table.rows.push_back(
-        {Code(result.name), result.suite, fmt::format("{}", benchmark.cases[k].published.size()),
-         Cell(ToText(result.verdict), MarkOf(benchmark.cases[k], result)), result.reason});
+    table.rows.push_back({ToCase(Code(result.name), result.name), result.suite,
+                          fmt::format("{}", benchmark.cases[k].published.size()),
+                          Cell(ToText(result.verdict), MarkOf(benchmark.cases[k], result)),
+                          result.reason});
   }
   return table;
 }
@@ -121,10 +134,11 @@ Table ErrorTable(const Benchmark& benchmark, const std::string& caption,
   for (const BenchmarkResult& result : benchmark.results) {
     if (result.engines.empty()) continue;
     std::vector<Cell>& row = table.rows.emplace_back();
-    row.push_back(Code(result.name));
+    row.push_back(ToCase(Code(result.name), result.name));
     for (const BenchmarkEngine& engine : benchmark.engines) {
       const EngineOnCase* found = FindEngine(result, engine.name);
-      row.emplace_back(found == nullptr || !found->ran() ? "–" : cell(*found));
+      row.push_back(found == nullptr || !found->ran() ? Cell("–")
+                                                      : ToCase(cell(*found), result.name));
     }
   }
   return table;
@@ -189,6 +203,69 @@ Table SourceTable(const Benchmark& benchmark) {
   return table;
 }
 
+// Of one case: a row a series, a column an engine.
+Table SeriesTable(const BenchmarkCase& one, const BenchmarkResult& result) {
+  Table table{.caption = "Largest difference to the published values",
+              .columns = {Text("signal"), Text("channel"), Digits("values"),
+                          Digits("uncertainty at the end")}};
+  for (const EngineOnCase& engine : result.engines) {
+    if (engine.ran()) table.columns.push_back(Digits(engine.engine));
+  }
+  for (size_t s = 0; s < one.published.size(); ++s) {
+    const PublishedSeries& series = one.published[s];
+    std::vector<Cell>& row = table.rows.emplace_back();
+    row = {Code(series.called), Code(series.channel), fmt::format("{}", series.values.size()),
+           fmt::format("{:.2g}", series.uncertainty.back())};
+    for (const EngineOnCase& engine : result.engines) {
+      if (!engine.ran()) continue;
+      const SeriesError& error = engine.series[s];
+      row.emplace_back(NumberOrDash(error.largest, "{:.2e}"),
+                       error.inside() ? Mark::kOk : Mark::kNone);
+    }
+  }
+  return table;
+}
+
+Table EnginesOfCase(const BenchmarkResult& result) {
+  Table table{.caption = "Engines, and their errors against the generic reference",
+              .columns = {Text("engine"), Wide("program or reason")}};
+  for (const Ranked& ranked : kRanked) table.columns.push_back(Digits(ranked.title));
+  table.columns.push_back(Digits("processor time [ms]"));
+  for (const EngineOnCase& engine : result.engines) {
+    std::vector<Cell>& row = table.rows.emplace_back();
+    row = {engine.engine, engine.ran() ? engine.program : OneLine(engine.why)};
+    for (const Ranked& ranked : kRanked) {
+      row.emplace_back(NumberOrDash(engine.*ranked.value, "{:.1e}"));
+    }
+    row.emplace_back(NumberOrDash(1e3 * engine.cpu_s, "{:.3g}"));
+  }
+  return table;
+}
+
+// Difference by uncertainty over time, an engine a line: the largest one of all series.
+LinePlot SharesOverTime(const BenchmarkCase& one, const BenchmarkResult& result) {
+  LinePlot plot{.title = "differences to published values over time",
+                .x_label = "time [s]",
+                .y_label = "difference by uncertainty",
+                .log_y = true};
+  for (const EngineOnCase& engine : result.engines) {
+    std::map<double, double> largest;
+    for (size_t s = 0; s < engine.computed.size(); ++s) {
+      const PublishedSeries& series = one.published[s];
+      for (size_t k = 0; k < series.values.size(); ++k) {
+        const double share =
+            std::abs(engine.computed[s][k] - series.values[k]) / series.uncertainty[k];
+        if (std::isfinite(share))
+          largest[series.time_s[k]] = std::max(largest[series.time_s[k]], share);
+      }
+    }
+    if (largest.empty()) continue;
+    plot.lines.push_back({.label = engine.engine, .markers = true});
+    plot.lines.back().points.assign(largest.begin(), largest.end());
+  }
+  return plot;
+}
+
 // Error over processor time by that of the reference, an engine a line: medians over the cases at
 // each multiple of their steps.
 LinePlot WorkPrecision(const Benchmark& benchmark) {
@@ -226,6 +303,28 @@ std::string CountsText(const Benchmark& benchmark) {
       benchmark.cases.size(), benchmark.series(), benchmark.Count(CaseVerdict::kConfirmed),
       benchmark.Count(CaseVerdict::kContradicted), benchmark.Count(CaseVerdict::kDisagree),
       benchmark.Count(CaseVerdict::kNotRun), benchmark.Count(CaseVerdict::kNotExpressible));
+}
+
+// Versions, programs outside, and the machine.
+std::string MadeBy(const Benchmark& benchmark) {
+  std::vector<std::string> parts;
+  for (const auto& [name, version] : Versions()) parts.push_back(name + " " + version);
+  for (const BenchmarkResult& result : benchmark.results) {
+    for (const EngineOnCase& engine : result.engines) {
+      if (!engine.program.empty() && !Contains(parts, engine.program)) {
+        parts.push_back(engine.program);
+      }
+    }
+  }
+  const std::string machine = ReadWholeFile("/proc/cpuinfo").value_or("");
+  const std::string key = "model name\t: ";
+  const size_t at = machine.find(key);
+  std::string text = "Made by " + Joined(parts);
+  if (at != std::string::npos) {
+    const size_t from = at + key.size();
+    text += fmt::format("; processor {}", machine.substr(from, machine.find('\n', at) - from));
+  }
+  return text + ".";
 }
 
 }  // namespace
@@ -290,7 +389,7 @@ std::string ToLatex(const Benchmark& benchmark) {
 }
 
 std::string ToMarkdown(const Benchmark& benchmark) {
-  std::string text = CountsText(benchmark) + ".\n\n## Engines\n\n" +
+  std::string text = CountsText(benchmark) + ".\n\n" + MadeBy(benchmark) + "\n\n## Engines\n\n" +
                      ToMarkdown(RankingTable(benchmark)) + "\n## Cases\n\n" +
                      ToMarkdown(CaseTable(benchmark)) + "\n## Errors\n";
   for (const Table& table : ErrorTables(benchmark)) text += "\n" + ToMarkdown(table);
@@ -300,7 +399,7 @@ std::string ToMarkdown(const Benchmark& benchmark) {
 
 std::string ToHtml(const Benchmark& benchmark) {
   Page page;
-  page.Add("Engines", "Engines", ToHtml(RankingTable(benchmark)));
+  page.Add("Engines", "Engines", ToHtml(RankingTable(benchmark)) + Note(MadeBy(benchmark)));
   page.Add("Cases", "Cases", ToHtml(CaseTable(benchmark)));
   ReportSection errors{.title = "Errors", .link = "Errors"};
   for (const Table& table : ErrorTables(benchmark)) errors.Add(table);
@@ -317,6 +416,52 @@ std::string ToHtml(const Benchmark& benchmark) {
                      .title = "Closed-loop dynamics benchmark",
                      .lead = CountsText(benchmark),
                      .judges = false});
+}
+
+std::string CasePage(const Benchmark& benchmark, size_t index) {
+  const BenchmarkCase& one = benchmark.cases[index];
+  const BenchmarkResult& result = benchmark.results[index];
+  ReportSection source{.title = "Source", .link = "Source"};
+  source.Add(
+      Items{{one.source.work, one.source.item, "licence: " + one.source.licence, one.source.url,
+             one.source.sha256.empty() ? "" : "sha256 " + one.source.sha256}});
+  ReportSection run{.title = "Run", .link = "Run"};
+  run.Add(Verbatim{"mbverify benchmark " + one.file});
+  run.Note(Sentence(result.settings));
+  if (!result.engines.empty()) run.Add(EnginesOfCase(result));
+  ReportSection published{.title = "Published values", .link = "Published"};
+  if (!result.engines.empty()) {
+    published.Add(SeriesTable(one, result));
+    published.Add(Drawing{ToSvg(SharesOverTime(one, result))});
+    published.Note(
+        fmt::format("{}.csv has every published value with what engines computed.", one.name));
+  }
+  Page page;
+  for (const ReportSection* section : {&source, &run, &published}) page.Add(*section);
+  return page.Write({.kicker = "mbverify benchmark",
+                     .title = one.title,
+                     .lead = fmt::format("{}: {}", ToText(result.verdict), result.reason),
+                     .judges = false});
+}
+
+std::string CaseCsv(const Benchmark& benchmark, size_t index) {
+  const BenchmarkCase& one = benchmark.cases[index];
+  const BenchmarkResult& result = benchmark.results[index];
+  std::string text = "signal,time_s,published,uncertainty";
+  for (const EngineOnCase& engine : result.engines) {
+    if (engine.ran()) text += "," + CsvCell(engine.engine);
+  }
+  for (size_t s = 0; s < one.published.size(); ++s) {
+    const PublishedSeries& series = one.published[s];
+    for (size_t k = 0; k < series.values.size(); ++k) {
+      text += fmt::format("\n{},{:.10g},{:.17g},{:.6g}", CsvCell(series.called), series.time_s[k],
+                          series.values[k], series.uncertainty[k]);
+      for (const EngineOnCase& engine : result.engines) {
+        if (engine.ran()) text += fmt::format(",{:.17g}", engine.computed[s][k]);
+      }
+    }
+  }
+  return text + "\n";
 }
 
 nlohmann::ordered_json ToJson(const Benchmark& benchmark) {
@@ -354,6 +499,7 @@ nlohmann::ordered_json ToJson(const Benchmark& benchmark) {
                        {"item", one.source.item},
                        {"licence", one.source.licence},
                        {"url", one.source.url}}},
+                     {"page", PageOf(one.name)},
                      {"verdict", ToText(result.verdict)},
                      {"as_stated", AsStated(one, result)},
                      {"reason", result.reason},

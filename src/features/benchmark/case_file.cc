@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <set>
 
 #include "base/files.h"
@@ -11,12 +12,16 @@
 #include "features/benchmark/benchmark.h"
 #include "model_file/yaml/yaml_reader.h"
 #include "scenario/tables/text.h"
+#include "verify/check_file.h"
 
 namespace mbv {
 namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kNameLetters =
+    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMostUncertain = 0.2;  // of the largest value: wider tubes hold anything
 
 // The numbers of a table's columns, by name.
@@ -88,6 +93,10 @@ class CaseReader {
     if (!map.valid()) return;
     case_.file = yaml_.file();
     case_.name = RequiredText(map, "benchmark");
+    if (case_.name.find_first_not_of(kNameLetters) != std::string::npos) {
+      yaml_.Error(*map.Find("benchmark"), fmt::format("benchmark: '{}' is no name", case_.name),
+                  "it names files: letters, digits, _ and - only");
+    }
     case_.title = RequiredText(map, "title");
     case_.suite = RequiredText(map, "suite");
     case_.published_is_wrong = OptionalText(map, "published_is_wrong");
@@ -103,7 +112,7 @@ class CaseReader {
       return;
     }
     const std::string scenario = RequiredText(map, "scenario");
-    case_.scenario = (fs::path(case_.file).parent_path() / scenario).string();
+    case_.scenario = PathOf(scenario);
     if (!scenario.empty() && !fs::is_regular_file(case_.scenario)) {
       yaml_.Error(*map.Find("scenario"), fmt::format("scenario: there is no file '{}'", scenario),
                   "relative to the case's folder");
@@ -121,19 +130,33 @@ class CaseReader {
   void ReadSource(const YamlMap& map) {
     const YamlNode* node = map.Required("source");
     if (node == nullptr) return;
-    const YamlMap source(&yaml_, node, "source", {"work", "item", "licence", "url", "sha256"});
+    const YamlMap source(&yaml_, node, "source",
+                         {"work", "item", "licence", "licence_file", "url", "sha256"});
     case_.source = {.work = RequiredText(source, "work"),
                     .item = OptionalText(source, "item"),
                     .licence = RequiredText(source, "licence"),
                     .url = OptionalText(source, "url"),
                     .sha256 = OptionalText(source, "sha256")};
+    const std::string licence = OptionalText(source, "licence_file");
+    if (licence.empty()) return;
+    if (const auto text = ReadWholeFile(PathOf(licence))) {
+      NoteInput(PathOf(licence), *text);
+    } else {
+      yaml_.Error(*source.Find("licence_file"),
+                  fmt::format("source.licence_file: there is no file '{}'", licence),
+                  "relative to the case's folder");
+    }
+  }
+
+  [[nodiscard]] std::string PathOf(const std::string& file) const {
+    return (fs::path(yaml_.file()).parent_path() / file).string();
   }
 
   // A column of a table, or a value at an instant.
   void ReadSeries(const YamlNode& node, const std::string& path) {
     const YamlMap map(&yaml_, &node, path,
                       {"channel", "called", "table", "column", "value", "at_s", "uncertainty",
-                       "relative", "at_start", "why", "proved", "scale"});
+                       "relative", "at_start", "until_s", "why", "proved", "scale"});
     if (!map.valid()) return;
     PublishedSeries series;
     series.channel = RequiredText(map, "channel");
@@ -146,6 +169,9 @@ class CaseReader {
       yaml_.Error(node, path + ": has " + (of_table ? "both table and value" : "no numbers"),
                   "either table and column, or value and at_s");
       return;
+    }
+    if (!of_table && map.Has("until_s")) {
+      yaml_.Error(*map.Find("until_s"), map.PathOf("until_s") + ": is for columns of a table");
     }
     double factor = 1.0;
     if (const YamlNode* scale = map.Find("scale")) {
@@ -173,7 +199,7 @@ class CaseReader {
                   "it lies beside the case: a file name without folders");
       return;
     }
-    const std::string file = (fs::path(yaml_.file()).parent_path() / name).string();
+    const std::string file = PathOf(name);
     if (file != table_file_) {
       table_file_ = file;
       table_ = ReadPublishedTable(file, &table_findings_);
@@ -188,8 +214,17 @@ class CaseReader {
                   fmt::format("{}: {} has no column '{}'", map.path(), name, column),
                   DidYouMean(column, table_->names, "columns: " + Joined(table_->names)));
     } else {
-      series->time_s = *time;
-      series->values = *values;
+      const YamlNode* until = map.Find("until_s");
+      const double last =
+          until == nullptr ? kInfinity : yaml_.Number(*until, map.PathOf("until_s")).value_or(kNan);
+      for (size_t k = 0; k < time->size() && (*time)[k] <= last; ++k) {
+        series->time_s.push_back((*time)[k]);
+        series->values.push_back((*values)[k]);
+      }
+      if (series->values.empty() && !std::isnan(last)) {
+        yaml_.Error(*until,
+                    fmt::format("{} = {:g}: the table begins later", map.PathOf("until_s"), last));
+      }
     }
     series->called = column;
   }
@@ -262,7 +297,8 @@ std::optional<BenchmarkCase> ReadBenchmarkCase(const std::string& file, Diagnost
 
 Diagnostics CheckBenchmarkCase(const std::string& file) {
   Diagnostics diagnostics;
-  (void)ReadBenchmarkCase(file, &diagnostics);
+  const auto read = ReadBenchmarkCase(file, &diagnostics);
+  if (read && !read->scenario.empty()) diagnostics.Append(CheckFile(read->scenario));
   return diagnostics;
 }
 

@@ -368,10 +368,10 @@ std::vector<InputFile> LoadAll(const std::vector<std::string>& scenarios,
   const InputWatch watch;
   for (const std::string& file : scenarios) {
     const DocumentKind& kind = KindOf(file);
-    if (kind.runs() || !fs::exists(file)) {
+    if (kind.runs() || IsBenchmarkCase(kind) || !fs::exists(file)) {
       diagnostics->Append(kind.check(file));
     } else {
-      diagnostics->AddError(file, "is neither a scenario nor a study",
+      diagnostics->AddError(file, "is neither a scenario, a study nor a case of the benchmark",
                             "of a robot's file mbverify init --from makes a model and a scenario");
     }
   }
@@ -607,8 +607,10 @@ void AddPackageCommand(CLI::App* app, int* exit_code) {
       package->add_flag("--check", arguments->check,
                         "repeat what an archive holds, and say which results are the same");
   package
-      ->add_option("scenario", arguments->scenarios,
-                   "scenario files or folders of them, and study files; with --check the archive")
+      ->add_option(
+          "scenario", arguments->scenarios,
+          "scenario files or folders of them, study files, and case.yaml of the benchmark; with "
+          "--check the archive")
       ->required();
   package->add_option("-o,--out", arguments->out, "the archive")
       ->capture_default_str()

@@ -115,7 +115,9 @@ Json ActionOf(const PackageDescription& package, size_t k) {
 }  // namespace
 
 std::string RerunCommand(const PackageDescription& package, const PackedScenario& scenario) {
-  std::string command = scenario.kind == "study" ? "mbverify study" : "mbverify run";
+  std::string command = scenario.kind == "study"       ? "mbverify study"
+                        : scenario.kind == "benchmark" ? "mbverify benchmark"
+                                                       : "mbverify run";
   for (const PackedMeshes& meshes : package.meshes) {
     command += " --package " + ShellWord(meshes.name + "=" + meshes.folder);
   }
@@ -252,7 +254,7 @@ class ManifestReader {
     } else {
       Complain("has a scenario without exit_code");
     }
-    if (scenario.kind != "motion" && scenario.kind != "stiffness" && scenario.kind != "study") {
+    if (!Contains({"motion", "stiffness", "study", "benchmark"}, scenario.kind)) {
       Complain(fmt::format("has a scenario of the kind '{}'", Printable(scenario.kind)));
     }
     return scenario;

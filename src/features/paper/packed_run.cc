@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "base/text.h"
 #include "base/worker_pool.h"
 #include "comparison/compare_stiffness.h"
+#include "features/benchmark/benchmark.h"
 #include "features/paper/figures.h"
 #include "features/paper/rerun_report.h"
 #include "features/run/run_scenario.h"
@@ -40,6 +42,8 @@ constexpr const char* kTraces = "traces.csv";
 constexpr const char* kStiffness = "stiffness.csv";
 constexpr const char* kLoads = "loads.csv";
 constexpr const char* kPoints = "points.csv";
+constexpr const char* kValues = "values.csv";
+constexpr const char* kBenchmark = "benchmark";
 
 // A CSV file of ours: a heading, then rows of as many cells. Refers to its text.
 struct OwnTable {
@@ -272,10 +276,41 @@ std::vector<RerunSignal> ComparePoints(const PackedScenario& scenario, const Bot
 }
 
 // The files of a kind of scenario that are judged number by number; all else follows from them.
+// What engines computed of a case's published values (CaseCsv()): by their uncertainties.
+std::vector<RerunSignal> CompareValues(const BothTables& tables, std::string* why) {
+  constexpr size_t kHead = 4;  // signal, time_s, published, uncertainty
+  const OwnTable &packed = tables.packed, &rerun = tables.rerun;
+  for (size_t i = 0; i < packed.rows.size() && why->empty(); ++i) {
+    const auto &a = packed.rows[i], &b = rerun.rows[i];
+    if (!std::equal(a.begin(), a.begin() + kHead, b.begin())) {
+      *why = fmt::format("has another published value in line {}", i + 2);
+    }
+  }
+  const std::vector<double> uncertainty = packed.Column(kHead - 1);
+  std::vector<RerunSignal> signals;
+  for (size_t c = kHead; c < packed.heading.size() && why->empty(); ++c) {
+    RerunSignal& worst = signals.emplace_back();
+    worst.signal = packed.heading[c];
+    worst.relative = worst.use = 0.0;
+    const std::vector<double> a = packed.Column(c), b = rerun.Column(c);
+    for (size_t i = 0; i < a.size(); ++i) {
+      if (std::isnan(a[i]) && std::isnan(b[i])) continue;  // it records no such signal
+      const double moved = std::abs(a[i] - b[i]), use = moved / (kRerunShare * uncertainty[i]);
+      if (use <= worst.use) continue;
+      worst.relative = moved / std::abs(a[i]);
+      worst.use = use;
+    }
+  }
+  return signals;
+}
+
 const std::vector<const char*>& NumberFiles(const std::string& kind) {
   static const std::vector<const char*> motion = {kTraces}, stiffness = {kStiffness, kLoads},
-                                        study = {kPoints};
-  return kind == "study" ? study : kind == "stiffness" ? stiffness : motion;
+                                        study = {kPoints}, benchmark = {kValues};
+  return kind == "study"       ? study
+         : kind == "stiffness" ? stiffness
+         : kind == kBenchmark  ? benchmark
+                               : motion;
 }
 
 // Signals of one of those; a sentence in `why` where the tables have other columns, rows or words.
@@ -285,6 +320,7 @@ std::vector<RerunSignal> CompareTables(const PackedScenario& scenario, const std
   const auto both = CutBoth(scenario.results + "/" + name, packed, rerun, why);
   if (!both) return {};
   if (scenario.kind == "study") return ComparePoints(scenario, *both, why);
+  if (scenario.kind == kBenchmark) return CompareValues(*both, why);
   if (scenario.kind == "stiffness") {
     std::string also;
     const auto matrices = CutBoth(scenario.results + "/" + kStiffness, packed, rerun, &also);
@@ -421,9 +457,10 @@ class PackedRunner {
     const DocumentKind& kind = KindOf(run_.scenario.file);
     run_.scenario.kind = kind.name;
     if (!MayCallPrograms()) return std::move(run_);
-    const bool study = kind.run == nullptr;
+    const bool benchmark = IsBenchmarkCase(kind);
+    const bool study = kind.run == nullptr && !benchmark;
     if (ReadsOutside(study)) return std::move(run_);
-    study ? RunAsStudy() : RunAsScenario();
+    benchmark ? RunAsBenchmark() : study ? RunAsStudy() : RunAsScenario();
     return std::move(run_);
   }
 
@@ -454,6 +491,32 @@ class PackedRunner {
                             : outcome.exit_code == 1 ? "limits broken"
                                                      : "not run";
     run_.scenario.reason = fmt::format("{} points", outcome.report->study.Points().count());
+  }
+
+  // Without programs outside, and without times: another machine has others.
+  void RunAsBenchmark() {
+    Benchmark benchmark;
+    Diagnostics diagnostics;
+    auto one = ReadBenchmarkCase(run_.scenario.file, &diagnostics);
+    if (!one) return Report(diagnostics, 2, "");
+    for (const BenchmarkEngine& engine : BenchmarkEngines()) {
+      if (engine.command.empty()) benchmark.engines.push_back(engine);
+    }
+    benchmark.cases.push_back(*std::move(one));
+    benchmark.results.push_back(RunBenchmarkCase(benchmark.cases.front(), benchmark.engines));
+    BenchmarkResult& result = benchmark.results.front();
+    for (EngineOnCase& engine : result.engines) engine.cpu_s = kNan;
+    std::vector<std::pair<std::string, std::string>> files = {{"errors.csv", ErrorsCsv(benchmark)},
+                                                              {kValues, CaseCsv(benchmark, 0)}};
+    if (options_.page) files.emplace_back("report.html", CasePage(benchmark, 0));
+    OutputFolder folder(kResultsFolder, fmt::format("{}/{}", kBenchmark, result.name));
+    if (const std::string trouble = folder.WriteAll(files); !trouble.empty()) {
+      return Refuse(trouble, "");
+    }
+    Report(diagnostics, benchmark.exit_code(), folder.target().string());
+    run_.scenario.description = result.title;
+    run_.scenario.verdict = ToText(result.verdict);
+    run_.scenario.reason = result.reason;
   }
 
   void RunAsScenario() {
@@ -540,6 +603,8 @@ PackedRun RunHere(const std::string& file, const PackedRunOptions& options,
 }
 
 }  // namespace
+
+bool IsBenchmarkCase(const DocumentKind& kind) { return kind.name == std::string(kBenchmark); }
 
 PackedRun RunPacked(const std::string& file, const PackedRunOptions& options,
                     const PackedTruth* truth) {

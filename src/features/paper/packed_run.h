@@ -10,6 +10,7 @@
 #include "base/diagnostics.h"
 #include "features/paper/package_manifest.h"
 #include "features/paper/rerun_report.h"
+#include "verify/check_file.h"
 #include "verify/program_consent.h"
 #include "verify/run_witnesses.h"
 
@@ -25,6 +26,10 @@ struct PackedRunOptions {
   bool figures = true;
   ProgramConsent programs = {.archived = true};  ///< that scenarios name
 };
+
+/// A case of the benchmark, which `mbverify benchmark` runs; here by the engines that need no other
+/// program.
+[[nodiscard]] bool IsBenchmarkCase(const DocumentKind& kind);
 
 /// What became of it.
 struct PackedRun {

@@ -17,7 +17,7 @@
 
 #include "base/run_summary.h"
 #include "features/workspace/pose_space.h"
-#include "features/workspace/resume.h"
+#include "math/resume.h"
 
 namespace mbv {
 

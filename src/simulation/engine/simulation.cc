@@ -241,6 +241,7 @@ MjcfOptions MjcfOptionsOf(const Motion& motion, const SimulationOptions& options
   MjcfOptions mjcf{.step_s = AdjustedStep(motion, options.step_s),
                    .time_constant_steps = options.stock_time_constant_steps,
                    .default_softness = options.engine == Engine::kDefaults,
+                   .runge_kutta = options.runge_kutta,
                    .prescribed = PrescribesMotion(options.mode)};
   if (options.mode == DriveMode::kServo) {
     mjcf.kp.assign(options.servo.kp.begin(), options.servo.kp.end());

@@ -39,6 +39,9 @@ struct SimulationOptions {
   /// Time constant of the generated file's equality constraints (stock engine), in steps, >= 2:
   /// MuJoCo itself raises smaller ones.
   double stock_time_constant_steps = 2.0;
+  /// Stock engine: MuJoCo's Runge–Kutta method instead of its semi-implicit Euler method. Targets
+  /// and loads stay as they are within a step.
+  bool runge_kutta = false;
   DriveForces forces = {};  ///< kForceDriven: the forces; kServo: feed-forward, or empty
   ServoGains servo = {};    ///< kServo only
   /// Free motion only: poses and twists of all bodies at t = 0. They are put onto the loops of the

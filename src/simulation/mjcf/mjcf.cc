@@ -481,7 +481,7 @@ void WriteHead(const Sections& s) {
   s.xml->Open("option");
   s.xml->Set("timestep", s.options.step_s);
   s.xml->Set("gravity", s.mechanism.gravity_W);
-  s.xml->Set("integrator", "Euler");
+  s.xml->Set("integrator", s.options.runge_kutta ? "RK4" : "Euler");
   s.xml->Set("solver", "Newton");
   s.xml->Set("tolerance", "1e-14");
   s.xml->Set("jacobian", DofsOfTree(s.mechanism) < kSparseFrom ? "dense" : "sparse");

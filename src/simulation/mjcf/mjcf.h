@@ -26,6 +26,7 @@ struct MjcfOptions {
   bool pictures = true;                                 ///< geoms, lights and scene assets
   double time_constant_steps = kMjcfTimeConstantSteps;  ///< of every equality (solref), in steps
   bool default_softness = false;  ///< equalities as soft as MuJoCo makes them unasked
+  bool runge_kutta = false;       ///< <option integrator>: RK4 instead of Euler
   bool prescribed = true;  ///< false: the equalities that prescribe drive motion are switched off
   std::vector<double> kp = {}, kv = {};  ///< servos: per drive, a position and a velocity actuator
   std::vector<double> motor_home = {};   ///< per drive: the motors' forces in the key "home"

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -74,19 +75,80 @@ TEST_F(BenchmarkTest, ConfirmsPublishedMotion) {
   EXPECT_EQ(ran, 2u);
 }
 
+// The first body's mass is off by 2 %. Four tables are too coarse for that
+// (docs/how-to/benchmark_cases.md); the others of this kind notice it.
 TEST_F(BenchmarkTest, AWrongMassIsContradicted) {
-  Copy("double_pendulum");
-  Replace("model.yaml", "mass: ", "mass: 1.02*");
-  const BenchmarkResult result = Run();
-  EXPECT_EQ(result.verdict, CaseVerdict::kContradicted) << result.reason;
-  EXPECT_THAT(result.reason, HasSubstr("revolute1.w"));
-  EXPECT_FALSE(AsStated(Read(), result));
+  const std::vector<std::string> coarse = {"fourbar_ssr", "fourbar_usr", "universal_pendulum",
+                                           "universal_torque"};
+  Diagnostics diagnostics;
+  size_t tried = 0;
+  for (const BenchmarkCase& one :
+       ReadBenchmarkCases({SourcePath("/scenarios/benchmark")}, &diagnostics)) {
+    if (one.suite != "modelica" || one.scenario.empty()) continue;
+    Copy(one.name);
+    Replace("model.yaml", "\n    mass: ", "\n    mass: 1.02*");
+    const BenchmarkResult result = Run();
+    const bool is_coarse = std::ranges::find(coarse, one.name) != coarse.end();
+    EXPECT_EQ(result.verdict, is_coarse ? CaseVerdict::kConfirmed : CaseVerdict::kContradicted)
+        << one.name << ": " << result.reason;
+    EXPECT_EQ(AsStated(Read(), result), is_coarse) << one.name;
+    ++tried;
+  }
+  EXPECT_GT(tried, 50u);
+}
+
+#ifdef MBV_ODE
+// Of first order: a tenth of the step, a tenth of the error; loops, trees, dampers, joint
+// reactions.
+TEST_F(BenchmarkTest, OdeConvergesToTheReference) {
+  for (const char* name : {"double_pendulum", "leg_two_masses", "gyroscopic_effects"}) {
+    Copy(name);
+    std::vector<BenchmarkEngine> engines = JudgingEngines();
+    for (const char* steps : {"20", "200"}) {
+      engines.push_back({.name = std::string("ode_") + steps,
+                         .about = "ODE",
+                         .command = std::string(MBV_ODE) + " " + steps});
+    }
+    const std::vector<EngineOnCase> rows = RunBenchmarkCase(Read(), engines).engines;
+    const EngineOnCase &coarse = rows[rows.size() - 2], &fine = rows.back();
+    ASSERT_TRUE(fine.ran()) << fine.why;
+    EXPECT_LT(fine.motion, 0.02) << name;
+    EXPECT_GT(coarse.motion, 7 * fine.motion) << name;
+    EXPECT_LT(coarse.motion, 14 * fine.motion) << name;
+    EXPECT_LT(fine.reaction, 0.3 * coarse.reaction) << name;
+  }
+}
+#endif
+
+// MuJoCo's Runge–Kutta method is of order four where there are no loops.
+TEST_F(BenchmarkTest, MujocoByRungeKuttaIsOfHighOrderOnTrees) {
+  Copy("universal_constraint");
+  std::vector<BenchmarkEngine> engines;
+  for (const BenchmarkEngine& engine : BenchmarkEngines()) {
+    if (engine.command.empty()) engines.push_back(engine);
+  }
+  for (const EngineOnCase& engine : RunBenchmarkCase(Read(), engines).engines) {
+    if (engine.engine == "mujoco") {
+      EXPECT_GT(engine.motion, 1e-6) << engine.why;
+    } else if (engine.engine == "mujoco_rk4") {
+      EXPECT_LT(engine.motion, 1e-10) << engine.why;
+    }
+  }
 }
 
 TEST_F(BenchmarkTest, AWrongSignIsContradicted) {
   Copy("damped_pendulum");
-  Replace("model.yaml", "gravity: [0, -9.81", "gravity: [0, 9.81");
+  Replace("model.yaml", "gravity: [0, -9.80665", "gravity: [0, 9.80665");
   EXPECT_EQ(Run().verdict, CaseVerdict::kContradicted);
+}
+
+// 9.81 m/s² instead of 9.80665 m/s².
+TEST_F(BenchmarkTest, AnotherGravityIsContradicted) {
+  for (const char* name : {"distance_sensor", "gyroscopic_effects", "spring_mass"}) {
+    Copy(name);
+    Replace("model.yaml", "-9.80665", "-9.81");
+    EXPECT_EQ(Run().verdict, CaseVerdict::kContradicted) << name;
+  }
 }
 
 TEST_F(BenchmarkTest, AWrongPublishedNumberIsContradictedAndMayBeStated) {
@@ -155,6 +217,10 @@ TEST_F(BenchmarkTest, ReportsAllFindingsOfACase) {
               HasSubstr("none.csv"));
   EXPECT_THAT(one("channel: c, why: w, table: ../secret.csv, column: a, relative: 0.01"),
               HasSubstr("it lies beside the case"));
+  EXPECT_EQ(one(table + "rev.phi, relative: 0.01, until_s: 0.5"), "");
+  EXPECT_THAT(one(table + "rev.phi, relative: 0.01, until_s: -1"), HasSubstr("begins later"));
+  EXPECT_THAT(one("channel: c, why: w, value: 1, at_s: 0, until_s: 1, uncertainty: 0.1"),
+              HasSubstr("is for columns of a table"));
   Write("words.csv", "time_s,a\n0,1\n0.1,one\n");
   EXPECT_THAT(one("channel: c, why: w, table: words.csv, column: a, relative: 0.01"),
               HasSubstr("words.csv:3:5: error: column 'a' has no number here"));
@@ -164,8 +230,23 @@ TEST_F(BenchmarkTest, ReportsAllFindingsOfACase) {
   for (const char* missing : {"title", "source", "nowhere.yaml", "published: is empty"}) {
     EXPECT_THAT(both, HasSubstr(missing));
   }
+  EXPECT_THAT(Findings("benchmark: ../x\ntitle: x\nsuite: x\n" + source + "not_expressible: y\n"),
+              HasSubstr("'../x' is no name"));
+  EXPECT_THAT(
+      Findings("benchmark: x\ntitle: x\nsuite: x\nsource: {work: x, licence: x, licence_file: "
+               "none.txt}\nnot_expressible: y\n"),
+      HasSubstr("there is no file 'none.txt'"));
   EXPECT_THAT(Findings(head + source + "not_expressible: why\n"),
               HasSubstr("scenario: the case is not_expressible"));
+}
+
+TEST_F(BenchmarkTest, TheEarlyPartOfAColumnIsASeriesOfItsOwn) {
+  Copy("damped_pendulum");
+  Replace("case.yaml", "column: \"rev.phi\",", "column: \"rev.phi\", until_s: 0.5,");
+  const BenchmarkCase read = Read();
+  EXPECT_NEAR(read.published[0].time_s.back(), 0.5, 1e-12);
+  EXPECT_EQ(read.published[0].values.size(), read.published[0].uncertainty.size());
+  EXPECT_GT(read.published[1].time_s.back(), 1.0);
 }
 
 // One published value of uncertainty 1, and engines' errors against it; NaN: not recorded.
@@ -217,12 +298,15 @@ TEST(BenchmarkCases, ShippedOnesAreSoundAndHaveTheirSource) {
   Diagnostics diagnostics;
   const auto cases = ReadBenchmarkCases({SourcePath("/scenarios/benchmark")}, &diagnostics);
   EXPECT_TRUE(diagnostics.findings().empty()) << diagnostics.Text();
-  EXPECT_GE(cases.size(), 40u);
+  EXPECT_GE(cases.size(), 60u);
+  size_t series = 0;
   for (const BenchmarkCase& one : cases) {
+    series += one.published.size();
     EXPECT_EQ(fs::path(one.file).parent_path().filename(), one.name)
         << "folders are named as cases";
     EXPECT_FALSE(one.source.url.empty()) << one.file;
   }
+  EXPECT_GE(series, 250u);
 }
 
 TEST(BenchmarkCommand, WritesTheSameErrorsTwiceAndFindsCasesByName) {
@@ -238,9 +322,36 @@ TEST(BenchmarkCommand, WritesTheSameErrorsTwiceAndFindsCasesByName) {
   const std::string errors = run("a");
   EXPECT_THAT(errors, HasSubstr("iftomm,iftomm_a05,confirmed,reference,rod1.force,"));
   EXPECT_EQ(errors, run("b"));
-  for (const char* file : {"benchmark.html", "cost.csv", "tables.tex", "benchmark.json"}) {
+  EXPECT_THAT(ReadAll(mbverify.folder() / "a/benchmark/benchmark.html"),
+              HasSubstr("<a href=\"cases/iftomm_a05.html\">"));
+  EXPECT_THAT(ReadAll(mbverify.folder() / "a/benchmark/cases/iftomm_a05.csv"),
+              HasSubstr("signal,time_s,published,uncertainty,reference,simulation\nshaft.force,"));
+  for (const char* file : {"benchmark.html", "cost.csv", "tables.tex", "benchmark.json",
+                           "cases/iftomm_a01.html", "cases/iftomm_a05.html"}) {
     EXPECT_GT(fs::file_size(mbverify.folder() / "a/benchmark" / file), 100u) << file;
   }
+}
+
+TEST(BenchmarkCommand, AnInterruptedRunGoesOnAndWritesTheSameErrors) {
+  const Program mbverify("benchmark_resume");
+  const std::string call =
+      "benchmark --suite adams --engine reference --jobs 1 --out '" + mbverify.Out();
+  ASSERT_EQ(mbverify(call + "/whole'").exit_code, 0);
+  // Killed when the first case is kept.
+  const ProgramResult killed = mbverify.Script(
+      "\"$mbverify\" " + call + "/cut' & pid=$!; log='" + mbverify.Out() +
+      "/cut/benchmark.part/cases.log'; i=0; while [ $i -lt 2000 ] && [ \"$(stat -c %s \"$log\" "
+      "2>/dev/null || echo 0)\" -lt 100 ]; do sleep 0.01; i=$((i+1)); done; kill -KILL $pid; wait "
+      "$pid");
+  ASSERT_EQ(killed.exit_code, 137) << killed.err;
+  const ProgramResult resumed = mbverify(call + "/cut' --resume");
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("goes on with what an interrupted run left"));
+  for (const char* file : {"errors.csv", "cases/adams_revolute_2.csv"}) {
+    EXPECT_EQ(ReadAll(mbverify.Out() + "/cut/benchmark/" + file),
+              ReadAll(mbverify.Out() + "/whole/benchmark/" + file));
+  }
+  EXPECT_FALSE(fs::exists(mbverify.Out() + "/cut/benchmark.part"));
 }
 
 TEST(BenchmarkCommand, RefusesWhatIsNoCaseEngineOrSuite) {

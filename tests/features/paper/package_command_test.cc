@@ -407,5 +407,22 @@ TEST(VerifyCommand, StudiesAreJudgedPointByPoint) {
   EXPECT_EQ(digit.exit_code, 0) << digit.out;
 }
 
+TEST(PackageCommand, ACaseOfTheBenchmarkIsRepeated) {
+  const Packed packed("benchmark", "scenarios/benchmark/adams_prismatic_2/case.yaml",
+                      "results/benchmark/adams_prismatic_2");
+  ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
+  EXPECT_TRUE(Has(packed.made().out, "confirmed")) << packed.made().out;
+  const ProgramResult same = packed.Verify("-v");
+  EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+  EXPECT_TRUE(Has(same.out, "inputs/benchmark/adams_LICENSE.txt") ||
+              Has(ReadAll(packed.Zip()), "adams_LICENSE.txt"));
+  const ProgramResult other = packed.Edited("scale RESULTS/values.csv simulation 1.001 honest");
+  EXPECT_EQ(other.exit_code, 1) << other.out;
+  EXPECT_TRUE(Has(other.out, "values.csv")) << other.out;
+  const ProgramResult rounded =
+      packed.Edited("scale RESULTS/values.csv simulation 1.0000000000001 honest");
+  EXPECT_EQ(rounded.exit_code, 0) << rounded.out;
+}
+
 }  // namespace
 }  // namespace mbv

@@ -1,5 +1,5 @@
 // Maps and searches that were interrupted go on, and end as if they had not been.
-#include "features/workspace/resume.h"
+#include "math/resume.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "features/workspace/resume.h"
+#include "math/resume.h"
 
 #include <unistd.h>
 #include <array>
@@ -88,12 +88,19 @@ ResumeFolder::ResumeFolder(fs::path folder, std::string identity)
   }
 }
 
-ResumeFolder::~ResumeFolder() {
+void ResumeFolder::Forget() {
   if (lock_ < 0) return;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
     if (entry.path().extension() == kEnding) fs::remove(entry.path(), error);
   }
+  resumes_ = false;
+}
+
+ResumeFolder::~ResumeFolder() {
+  if (lock_ < 0) return;
+  Forget();
+  std::error_code error;
   // Unless something else is in them.
   fs::remove(folder_, error);
   for (const fs::path& made : made_) fs::remove(made, error);

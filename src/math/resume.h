@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,14 +28,25 @@ class ResultLog {
 
   template <typename T, typename Compute>
   [[nodiscard]] T Get(const Compute& compute) {
+    if (auto kept = Kept<T>()) return *std::move(kept);
+    T value = compute();
+    Keep(value);
+    return value;
+  }
+  /// The next result of those that an earlier run has kept; empty behind the last one.
+  template <typename T>
+  [[nodiscard]] std::optional<T> Kept() {
     std::string bytes;
     while (Next(&bytes)) {
-      if (auto kept = FromBytes<T>(bytes)) return *std::move(kept);
+      if (auto kept = FromBytes<T>(bytes)) return kept;
       Forget();
     }
-    T value = compute();
+    return {};
+  }
+  /// Behind those that Kept() gave, all of them.
+  template <typename T>
+  void Keep(const T& value) {
     if (!file_.empty()) Append(ToBytes(value));
-    return value;
   }
   /// Results that an earlier run left, so far.
   [[nodiscard]] size_t kept() const { return kept_; }
@@ -66,6 +78,8 @@ class ResumeFolder {
   [[nodiscard]] ResultLog Log(const std::string& name) const;
   /// What an interrupted run left is there.
   [[nodiscard]] bool resumes() const { return resumes_; }
+  /// Removes it.
+  void Forget();
 
  private:
   std::filesystem::path folder_;
