@@ -8,6 +8,7 @@
 #include "features/run/run_scenario.h"
 #include "features/stiffness/stiffness.h"
 #include "features/study/study.h"
+#include "model_file/catalogue.h"
 #include "verify/check_file.h"
 
 namespace mbv {
@@ -85,6 +86,9 @@ bool IsStudy(const std::string& /*file*/, const ScenarioHead& head) {
 bool IsBenchmark(const std::string& /*file*/, const ScenarioHead& head) {
   return !head.is_scenario && head.HasKey("benchmark");
 }
+bool IsCatalogue(const std::string& /*file*/, const ScenarioHead& head) {
+  return !head.is_scenario && head.HasKey("catalogue");
+}
 bool IsStiffness(const std::string& /*file*/, const ScenarioHead& head) {
   return head.is_scenario && head.kind == "stiffness";
 }
@@ -109,6 +113,7 @@ constexpr std::array kDocuments = {
     DocumentKind{.name = "mechanism", .is = IsMechanismJson, .check = CheckMechanismFile},
     DocumentKind{.name = "study", .is = IsStudy, .check = CheckStudy, .command = "study"},
     DocumentKind{.name = "benchmark", .is = IsBenchmark, .check = CheckBenchmarkCase},
+    DocumentKind{.name = "catalogue", .is = IsCatalogue, .check = CheckCatalogue},
     DocumentKind{.name = "stiffness",
                  .is = IsStiffness,
                  .check = CheckStiffness,

@@ -17,6 +17,7 @@
 #include "base/roles.h"
 #include "base/run_summary.h"
 #include "comparison/metrics.h"
+#include "comparison/motor_load.h"
 #include "kinematics/command_rank.h"
 #include "math/trace.h"
 #include "mechanism/mechanism.h"
@@ -91,8 +92,9 @@ struct ComparisonInput {
   double integration_error = kNan;
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
-  std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
-  std::string unchecked_coverage = {};     ///< why it is unknown what the analytic witness covers
+  std::vector<std::string> left_out = {};    ///< by the model, of the file that it was made from
+  std::string unchecked_coverage = {};       ///< why it is unknown what the analytic witness covers
+  std::vector<DriveFacts> drive_facts = {};  ///< by motor; empty: nothing is known
   /// The witnesses bring stiffnesses instead of traces; the motion is the pose, commanded.
   bool of_stiffness = false;
 };

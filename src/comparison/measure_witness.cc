@@ -691,15 +691,18 @@ void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetri
   }
 }
 
-// The hardest used motor, where a margin is required.
+// What is used most of motors and their DC link, where a margin is required.
 void MeasureMotors(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
   if (!input.limits[Metric::kMotorUse].reference) return;
-  for (const Motor& motor : input.mechanism->motors) {
-    const MotorLoad load = MotorLoadOf(*input.mechanism, motor, trace);
-    if (!load.known()) continue;
-    KeepWorst(&out->metrics[Metric::kMotorUse], load.largest_use(), load.largest_use_time_s(),
-              load.drive);
+  Measured* worst = &out->metrics[Metric::kMotorUse];
+  const std::vector<MotorLoad> loads = MotorLoadsOf(*input.mechanism, trace, input.drive_facts);
+  for (const MotorLoad& load : loads) {
+    KeepWorst(worst, load.largest_use(), load.largest_use_time_s(), load.drive);
   }
+  if (!input.mechanism->dc_link) return;
+  const auto link = LinkLoadOf(*input.mechanism->dc_link, loads);
+  const MotorLoad::Use* use = link ? LargestUse(link->uses) : nullptr;
+  if (use != nullptr) KeepWorst(worst, use->use, use->time_s, "DC link");
 }
 
 }  // namespace

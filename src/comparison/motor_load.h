@@ -1,6 +1,8 @@
 // What a run asks of a drive's motor (mechanism/mechanism.h), and how much of the motor that uses.
 #pragma once
 
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,17 @@ struct MotorLoad {
   double rms_current = kNan, peak_current = kNan;  ///< where k_t is given [A]
   double peak_voltage = kNan;                      ///< where k_t and resistance are [V]
   double inertia_ratio = kNan;  ///< of the load, reflected to the rotor, to the rotor's own
+  VecX electric_W = {};         ///< τω and, where k_t and resistance are given, losses R i²
+  double fed_back_J = kNan;     ///< electrical, per cycle; >= 0
+
+  VecX winding_C = {};  ///< over a cycle of the motion that is repeated for ever [°C]
+  double winding_peak_C = kNan, housing_peak_C = kNan;  ///< of it; infinite: thermal runaway
+  double overheated_s = kNan;  ///< from ambient temperature to the highest allowed; NaN: never
+  double gear_torque = kNan, gear_mean_torque = kNan;  ///< at the gearbox's output
+  double gear_emergency_torque = kNan;                 ///< also where the brake stops the motor
+  double holding_torque = kNan;                        ///< that the brake needs, at rest
+  double stop_energy_J = kNan;                         ///< largest of one stop by the brake
+
   size_t samples_at_rest = 0;   ///< at which the force is open
   std::string unresolved = {};  ///< why the samples do not resolve the motion; "" if they do
   std::vector<Use> uses = {};   ///< of every limit that the motor states
@@ -48,8 +61,41 @@ struct MotorLoad {
   [[nodiscard]] double margin() const { return 1.0 / largest_use(); }
 };
 
-/// `load_inertia`: what the drive moves, at the drive [kg m² or kg]; NaN where it is not known.
-[[nodiscard]] MotorLoad MotorLoadOf(const Mechanism& mechanism, const Motor& motor,
-                                    const Trace& trace, double load_inertia = kNan);
+/// What a brake of a drive bears at each sample, by the reference; empty where it is not known.
+struct DriveAtRest {
+  VecX force = {};     ///< that holds the mechanism at rest there, without friction
+  VecX energy_J = {};  ///< this drive's share p v/2 of the kinetic energy; shares may be negative
+};
+
+/// What is known of a drive in addition to a witness's trace.
+struct DriveFacts {
+  double load_inertia = kNan;  ///< what it moves, at the drive [kg m² or kg]
+  DriveAtRest at_rest = {};
+};
+
+/// `drive`: its name.
+[[nodiscard]] MotorLoad MotorLoadOf(const std::string& drive, const Motor& motor,
+                                    const Trace& trace, const DriveFacts& facts = {});
+/// Of all motors whose drive the witness records. `facts` by motor; empty: nothing is known.
+[[nodiscard]] std::vector<MotorLoad> MotorLoadsOf(const Mechanism& mechanism, const Trace& trace,
+                                                  std::span<const DriveFacts> facts = {});
+
+/// The DC link of one witness over a cycle of the repeated motion.
+struct LinkLoad {
+  std::string witness = {};
+  VecX power = {};           ///< that all motors draw, by sample; negative: fed back [W]
+  double peak_power = kNan;  ///< largest that is drawn [W]
+  double drawn_J = kNan, fed_back_J = kNan;           ///< by all motors together, per cycle; >= 0
+  double capacitor_J = kNan, resistor_J = kNan;       ///< of what is fed back: kept, and burnt
+  double resistor_mean = kNan, resistor_peak = kNan;  ///< power [W]
+  std::string unresolved = {};                        ///< see MotorLoad
+  std::vector<MotorLoad::Use> uses = {};
+};
+/// `loads`: of all motors by one witness, over the same samples. Empty without loads.
+[[nodiscard]] std::optional<LinkLoad> LinkLoadOf(const DcLink& link,
+                                                 std::span<const MotorLoad> loads);
+
+/// The use that is largest; null without limits.
+[[nodiscard]] const MotorLoad::Use* LargestUse(std::span<const MotorLoad::Use> uses);
 
 }  // namespace mbv

@@ -38,8 +38,49 @@ struct CurvePoint {
   double speed = 0.0, torque = 0.0;
 };
 
+inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+/// The winding, which copper losses heat, in a housing: two bodies, as data sheets state them.
+struct MotorThermal {
+  double winding_to_housing = kNan;  ///< thermal resistance R1 [K/W]
+  double housing_to_ambient = kNan;  ///< R2 [K/W]
+  double winding_time = kNan;        ///< time constant τ1 [s]: heat capacity τ1/R1
+  double housing_time = kNan;        ///< τ2 [s]: heat capacity τ2/R2
+  double ambient_C = 25.0;           ///< [°C]
+  double max_winding_C = kNan;       ///< [°C], > ambient_C
+  double resistance_at_C = 25.0;     ///< winding temperature of Motor::resistance [°C]
+  double resistance_growth = 0.0;    ///< of it per kelvin, copper: 0.0039 [1/K]
+};
+
+/// Limits of a gearbox: torque at its output, before a spindle; speed at its input.
+struct MotorGearbox {
+  double mean_torque = kUnlimited;       ///< mean of power `exponent` over revolutions
+  double peak_torque = kUnlimited;       ///< repeatable: starting and stopping
+  double emergency_torque = kUnlimited;  ///< momentary: emergency stops
+  double mean_speed = kUnlimited, max_speed = kUnlimited;
+  double exponent = 3.0;  ///< of the mean torque
+};
+
+/// A holding brake on the motor's shaft.
+struct MotorBrake {
+  double torque = kNan;        ///< static
+  double energy = kUnlimited;  ///< of one emergency stop [J]
+};
+
+/// The DC link that all motors share: it takes what they feed back into its capacitor, and burns
+/// the rest in a resistor.
+struct DcLink {
+  double efficiency = 1.0;         ///< of the inverters, in both directions; <= 1
+  double capacitance = 0.0;        ///< [F]
+  double voltage = kNan;           ///< of the supply, idle [V]
+  double brake_voltage = kNan;     ///< at which the resistor is switched on, > voltage [V]
+  double resistance = kNan;        ///< of the resistor [Ω]: it takes brake_voltage²/resistance
+  double mean_power = kUnlimited;  ///< that the resistor bears for ever [W]
+  double peak_power = kUnlimited;  ///< for short [W]
+};
+
 struct Motor {
-  static constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  static constexpr double kNoLimit = kUnlimited;
 
   int drive = -1;                 ///< index into Mechanism::drives
   bool turns = true;              ///< else it slides
@@ -51,6 +92,7 @@ struct Motor {
   double max_speed = kNoLimit;    ///< never faster
   double rotor_inertia = 0.0;     ///< J_r [kg m²], or mass of the slider [kg]
   double gear_ratio = 1.0;        ///< n > 0
+  double spindle = 1.0;           ///< of n: 2π/lead behind the gearbox [1/m]; 1 without a lead
   double efficiency = 1.0;        ///< η of the gear, 0 < η <= 1
   double torque_constant = kNan;  ///< k_t [N m/A]; [N/A]
   double resistance = kNan;       ///< of the winding [Ω]
@@ -58,7 +100,10 @@ struct Motor {
   double continuous_current = kNoLimit, peak_current = kNoLimit;  ///< [A]
   /// Instead of `continuous` and `peak` constant over speed: increasing speeds, straight lines
   /// between; beyond the last point nothing is left.
-  std::vector<CurvePoint> continuous_curve, peak_curve;
+  std::vector<CurvePoint> continuous_curve = {}, peak_curve = {};
+  std::optional<MotorThermal> thermal = {};  ///< with torque_constant and resistance
+  std::optional<MotorGearbox> gearbox = {};
+  std::optional<MotorBrake> brake = {};
 
   [[nodiscard]] const char* torque_unit() const { return turns ? "N m" : "N"; }
   [[nodiscard]] const char* speed_unit() const { return turns ? "rad/s" : "m/s"; }
@@ -433,8 +478,9 @@ struct Mechanism {
   std::vector<Coupling> couplings;
   std::vector<Bushing> bushings;
   std::vector<ForceElement> elements;
-  std::vector<Motor> motors;  ///< at most one per drive; no witness reads them
-  std::vector<Beam> beams;    ///< of the elastic bodies; empty in most models
+  std::vector<Motor> motors;      ///< at most one per drive; no witness reads them
+  std::optional<DcLink> dc_link;  ///< of the motors
+  std::vector<Beam> beams;        ///< of the elastic bodies; empty in most models
 
   std::vector<int> tree_joints;     ///< indices of the spanning tree's joints, parents first (every
                                     ///< non-world body is the outboard body of exactly one)

@@ -171,7 +171,7 @@ const std::vector<std::string> kModelKeys = {
     "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
     "urdf",   "attach",      "up",         "materials", "sections", "parameters_from", "allow",
     "closure_tolerance", "closure_tolerance_mm", "couplings", "motors", "elements",
-    "legs",   "license",     "left_out",   "symbols",   "contacts"};
+    "legs",   "license",     "left_out",   "symbols",   "contacts", "dc_link"};
 // clang-format on
 
 // Reads what needs no parameter.
@@ -549,6 +549,7 @@ struct ModelSections {
   std::vector<SpringDamper> springs;
   std::vector<Coupling> couplings;
   std::vector<Motor> motors;
+  std::optional<DcLink> dc_link;
   std::vector<Bushing> bushings;
   std::vector<ForceElement> elements;
   internal::ModelBeams beams;
@@ -623,6 +624,7 @@ void ReadMotors(const Block& model, YamlReader* yaml, ModelSections* s) {
   internal::Literals unperturbed(none);
   internal::ModelValues values(yaml, &unperturbed);
   internal::ReadMotors(model, s->drives, s->joints.joints, &values, &s->motors);
+  s->dc_link = internal::ReadDcLink(model, &values);
 }
 
 // Of the file, then those of --plant, each with findings of its own. What the ground bears is not
@@ -722,6 +724,7 @@ Mechanism Assembled(const std::string& file, ModelSections* s) {
   mechanism.springs = std::move(s->springs);
   mechanism.couplings = std::move(s->couplings);
   mechanism.motors = std::move(s->motors);
+  mechanism.dc_link = s->dc_link;
   mechanism.bushings = std::move(s->bushings);
   mechanism.elements = std::move(s->elements);
   mechanism.beams = std::move(s->beams.beams);

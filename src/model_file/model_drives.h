@@ -83,14 +83,15 @@ void ReadPrescribed(const Block& block, const ModelJoints& joints, YamlReader* y
 /// Adds a block for each leg of the blocks that there are; findings go to the reader.
 void ExpandLegs(ModelValues* values, ModelBlocks* blocks);
 
-// `motors` of a model file. Internal to the model loader.
+// `motors` and `dc_link` of a model file. Internal to the model loader.
 
 /// Reads the motors of known drives (mechanism/mechanism.h). Only a model has them, parts do not:
 /// they are named as the drives of the whole model.
 void ReadMotors(const Block& model, const std::vector<Drive>& drives,
                 const std::vector<Joint>& joints, ModelValues* values, std::vector<Motor>* motors);
 
-/// A motor as a model file's map, without braces; reads back to the same numbers.
-[[nodiscard]] std::string MotorText(const Motor& motor);
+/// Empty where there is none, and after a finding.
+[[nodiscard]] std::optional<DcLink> ReadDcLink(const Block& model, ModelValues* values);
+[[nodiscard]] std::string DcLinkText(const DcLink& link);
 
 }  // namespace mbv::internal

@@ -23,7 +23,7 @@ const std::vector<std::string>& KeysOf(const std::string& kind) {
       {"spring",
        {"stiffness", "stiffness_per_mm", "stiffness_per_deg", "polynomial", "free", "free_deg",
         "free_mm", "preload"}},
-      {"rotor", {"inertia", "inertia_kgcm2", "ratio", "gyroscopic", "axis_on", "axis"}},
+      {"rotor", {"inertia", "inertia_kg_cm2", "ratio", "gyroscopic", "axis_on", "axis"}},
       {"stop",
        {"lower", "lower_deg", "lower_mm", "upper", "upper_deg", "upper_mm", "stiffness",
         "stiffness_per_mm", "stiffness_per_deg", "exponent", "damping", "damping_per_mm",

@@ -10,6 +10,7 @@
 
 #include "base/files.h"
 #include "mechanism/reach.h"
+#include "model_file/catalogue.h"
 #include "model_file/element_text.h"
 #include "model_file/mesh/read_mesh.h"
 #include "model_file/model_contacts.h"
@@ -299,8 +300,9 @@ class ModelWriter {
     if (!m_.motors.empty()) text += "motors:\n";
     for (const Motor& motor : m_.motors) {
       text += fmt::format("  {}: {{{}}}\n", names_.drives[static_cast<size_t>(motor.drive)],
-                          internal::MotorText(motor));
+                          MotorText(motor));
     }
+    if (m_.dc_link) text += fmt::format("dc_link: {{{}}}\n", internal::DcLinkText(*m_.dc_link));
     return text;
   }
 

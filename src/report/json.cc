@@ -248,6 +248,7 @@ std::string ToJson(const Report& report) {
   }
   json["loads"] = LoadsJson(report);
   if (!report.motors.empty()) json["motors"] = SizingJson(report);
+  if (!report.link_loads.empty()) json["dc_link"] = LinkJson(report);
   if (!report.phases.empty()) json["phases"] = PhasesJson(report);
   if (!report.contact_loads.empty()) json["contacts"] = ContactsJson(report);
   if (!report.singular.of.empty()) json["singularity"] = SingularityJson(report);

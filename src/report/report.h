@@ -118,6 +118,9 @@ struct Report : ResultFrame {
   std::vector<SmoothedForce> smoothed_forces;  ///< empty where none is smoothed
   std::vector<Motor> motors;                   ///< of the model
   std::vector<MotorLoad> motor_loads;          ///< by witness that ran, then by motor
+  std::vector<DriveFacts> drive_facts;         ///< by motor
+  std::optional<DcLink> dc_link;               ///< of the model
+  std::vector<LinkLoad> link_loads;            ///< of it, by witness that ran
   std::optional<EngineComparison> engine_comparison;
   std::shared_ptr<const SourceModelAudit> source_model;  ///< of a robot's MJCF; null without one
   std::vector<ReportPart> parts = {};

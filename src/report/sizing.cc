@@ -33,9 +33,9 @@ std::string MarginText(const MotorLoad& load) {
   return fmt::format("margin not known: {}; at the samples alone {}", load.unresolved, margin);
 }
 
-std::string UsesText(const MotorLoad& load) {
+std::string UsesText(const std::vector<MotorLoad::Use>& uses) {
   std::string text;
-  for (const MotorLoad::Use& use : load.uses) {
+  for (const MotorLoad::Use& use : uses) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", use.of, Percent(use.use));
   }
   return text.empty() ? "–" : text;
@@ -44,6 +44,93 @@ std::string UsesText(const MotorLoad& load) {
 std::string AtRestText(const MotorLoad& load) {
   return fmt::format("friction rests at {} of {} samples: the worse end of the band counts",
                      load.samples_at_rest, load.time_s.size());
+}
+
+std::string Celsius(double value) {
+  return std::isinf(value) ? "without end" : WithUnit(value, "°C");
+}
+
+std::string OverheatedText(const MotorLoad& load) {
+  return fmt::format("repeated from ambient temperature, it is too hot after {}",
+                     WithUnit(load.overheated_s, "s"));
+}
+
+// What winding, gearbox and brake bear, where the motor states them.
+std::vector<std::string> MoreLines(const MotorLoad& load) {
+  std::vector<std::string> lines;
+  if (!std::isnan(load.winding_peak_C)) {
+    lines.push_back(fmt::format("winding of the repeated motion: at most {}, housing {}",
+                                Celsius(load.winding_peak_C), Celsius(load.housing_peak_C)));
+    if (!std::isnan(load.overheated_s)) lines.back() += "; " + OverheatedText(load);
+  }
+  const std::string& t = load.torque_unit;
+  if (!std::isnan(load.gear_torque)) {
+    lines.push_back(fmt::format("gearbox, at its output: peak {}, mean {}, emergency {}",
+                                WithUnit(load.gear_torque, t), WithUnit(load.gear_mean_torque, t),
+                                WithUnit(load.gear_emergency_torque, t)));
+  }
+  if (!std::isnan(load.holding_torque)) {
+    lines.push_back(fmt::format(
+        "brake: holds {}, one stop {}", WithUnit(load.holding_torque, t),
+        std::isinf(load.stop_energy_J) ? "is not possible" : WithUnit(load.stop_energy_J, "J")));
+  }
+  return lines;
+}
+
+std::string LinkText(const LinkLoad& load, bool details) {
+  const MotorLoad::Use* use = LargestUse(load.uses);
+  std::string text = use == nullptr    ? "no limit is stated"
+                     : use->use == 0.0 ? "its resistor is not used"
+                                       : fmt::format("margin {:.3g} ({})", 1.0 / use->use, use->of);
+  if (!load.unresolved.empty()) text = "not known: " + load.unresolved;
+  if (!details) return "DC link: " + text;
+  return fmt::format(
+      "DC link: {}\n  drawn {} per cycle, at most {}; fed back {}: capacitor {}, resistor {}\n"
+      "  resistor: mean {}, peak {}; used: {}",
+      text, WithUnit(load.drawn_J, "J"), WithUnit(load.peak_power, "W"),
+      WithUnit(load.fed_back_J, "J"), WithUnit(load.capacitor_J, "J"),
+      WithUnit(load.resistor_J, "J"), WithUnit(load.resistor_mean, "W"),
+      WithUnit(load.resistor_peak, "W"), UsesText(load.uses));
+}
+
+PlotLine OverTime(const std::string& label, const std::vector<double>& time_s, const VecX& values) {
+  PlotLine line{.label = label};
+  const size_t rows = std::min(time_s.size(), static_cast<size_t>(values.size()));
+  for (size_t i = 0; i < rows; ++i) {
+    line.points.emplace_back(time_s[i], values[static_cast<Eigen::Index>(i)]);
+  }
+  return line;
+}
+
+std::string OverTimeHtml(const std::string& title, const std::string& y_label,
+                         std::vector<PlotLine> lines) {
+  return FigureHtml(ToSvg(LinePlot{
+      .title = title, .x_label = "time [s]", .y_label = y_label, .lines = std::move(lines)}));
+}
+
+std::string WindingHtml(const MotorLoad& load) {
+  return OverTimeHtml(load.drive + ": winding over a cycle of the repeated motion",
+                      "temperature [°C]", {OverTime(load.witness, load.time_s, load.winding_C)});
+}
+
+// What the brake holds at each pose of the motion.
+std::string HoldingHtml(const Motor& motor, const MotorLoad& load, const VecX& force) {
+  const VecX holds = force.cwiseAbs() * (motor.efficiency / motor.gear_ratio);
+  const VecX limit = VecX::Constant(holds.size(), motor.brake->torque);
+  return OverTimeHtml(
+      load.drive + ": torque that holds it at rest, at the brake",
+      fmt::format("|torque| [{}]", load.torque_unit),
+      {OverTime("needed", load.time_s, holds), OverTime("brake", load.time_s, limit)});
+}
+
+std::string ElectricHtml(const std::vector<const MotorLoad*>& loads, const LinkLoad& link) {
+  std::vector<PlotLine> lines;
+  for (const MotorLoad* load : loads) {
+    lines.push_back(OverTime(load->drive, load->time_s, load->electric_W));
+  }
+  lines.push_back(OverTime("DC link", loads.front()->time_s, link.power));
+  return OverTimeHtml("Electrical power of the drives and of their DC link", "power [W]",
+                      std::move(lines));
 }
 
 Table FiguresTable(const std::vector<const MotorLoad*>& loads) {
@@ -57,7 +144,7 @@ Table FiguresTable(const std::vector<const MotorLoad*>& loads) {
   };
   for (const MotorLoad* load : loads) {
     const std::string &t = load->torque_unit, &s = load->speed_unit;
-    html.rows.push_back({load->drive, NumberOrDash(load->margin(), "{:.3g}"), UsesText(*load),
+    html.rows.push_back({load->drive, NumberOrDash(load->margin(), "{:.3g}"), UsesText(load->uses),
                          WithUnit(load->peak_torque, t), WithUnit(load->rms_torque, t),
                          WithUnit(load->mean_torque, t), WithUnit(load->continuous_torque, t),
                          WithUnit(load->peak_speed, s), WithUnit(load->mean_speed, s),
@@ -119,6 +206,14 @@ void Keep(double value, const std::string& scenario, MotorEnvelope::Most* most) 
   if (std::abs(value) > most->value) *most = {std::abs(value), scenario};
 }
 
+Json UsesJson(const std::vector<MotorLoad::Use>& given) {
+  Json uses = Json::array();
+  for (const MotorLoad::Use& use : given) {
+    uses.push_back({{"of", use.of}, {"use", Number(use.use)}, {"time_s", Number(use.time_s)}});
+  }
+  return uses;
+}
+
 Json MostJson(const MotorEnvelope::Most& most) {
   return {{"value", Number(most.value)}, {"scenario", most.scenario}};
 }
@@ -134,6 +229,26 @@ std::vector<const MotorLoad*> MainMotorLoads(const Report& report) {
     if (load.witness == witness) loads.push_back(&load);
   }
   return loads;
+}
+
+void AddMotorLoads(const Mechanism& mechanism, const WitnessRecord& record,
+                   const std::string& unresolved, Report* report) {
+  std::vector<MotorLoad> loads = MotorLoadsOf(mechanism, record.trace, report->drive_facts);
+  for (MotorLoad& load : loads) load.witness = record.name, load.unresolved = unresolved;
+  if (mechanism.dc_link) {
+    if (auto link = LinkLoadOf(*mechanism.dc_link, loads)) {
+      report->link_loads.push_back(*std::move(link));
+    }
+  }
+  std::ranges::move(loads, std::back_inserter(report->motor_loads));
+}
+
+const LinkLoad* MainLinkLoad(const Report& report) {
+  const std::vector<const MotorLoad*> loads = MainMotorLoads(report);
+  for (const LinkLoad& load : report.link_loads) {
+    if (!loads.empty() && load.witness == loads.front()->witness) return &load;
+  }
+  return nullptr;
 }
 
 std::vector<std::string> SizingLines(const Report& report, bool details) {
@@ -160,16 +275,19 @@ std::vector<std::string> SizingLines(const Report& report, bool details) {
                     WithUnit(load->energy_J, "J"), WithUnit(load->brake_energy_J, "J")));
     if (std::isfinite(load->rms_current)) {
       lines.push_back(
-          fmt::format("  current: peak {}, RMS {}; voltage {}", WithUnit(load->peak_current, "A"),
-                      WithUnit(load->rms_current, "A"), WithUnit(load->peak_voltage, "V")));
+          fmt::format("  current: peak {}, RMS {}; voltage {}; fed back per cycle {}",
+                      WithUnit(load->peak_current, "A"), WithUnit(load->rms_current, "A"),
+                      WithUnit(load->peak_voltage, "V"), WithUnit(load->fed_back_J, "J")));
     }
     if (std::isfinite(load->inertia_ratio)) {
       lines.push_back(
           fmt::format("  load inertia / rotor inertia at home: {:.3g}", load->inertia_ratio));
     }
     if (load->samples_at_rest > 0) lines.push_back("  " + AtRestText(*load));
-    lines.push_back("  used: " + UsesText(*load));
+    for (const std::string& line : MoreLines(*load)) lines.push_back("  " + line);
+    lines.push_back("  used: " + UsesText(load->uses));
   }
+  if (const LinkLoad* link = MainLinkLoad(report)) lines.push_back(LinkText(*link, details));
   return lines;
 }
 
@@ -181,7 +299,17 @@ std::string SizingHtml(const Report& report) {
     const Motor* motor = MotorOf(report, *load);
     if (!load->unresolved.empty()) html += Note(load->drive + ": " + MarginText(*load) + ".");
     if (load->samples_at_rest > 0) html += Note(load->drive + ": " + AtRestText(*load) + ".");
+    for (const std::string& line : MoreLines(*load)) html += Note(load->drive + ": " + line + ".");
     if (motor != nullptr && load->known()) html += CloudHtml(*motor, *load);
+    if (load->winding_C.size() > 0) html += WindingHtml(*load);
+    if (motor == nullptr || std::isnan(load->holding_torque)) continue;
+    const auto k = static_cast<size_t>(motor - report.motors.data());
+    if (k < report.drive_facts.size()) {
+      html += HoldingHtml(*motor, *load, report.drive_facts[k].at_rest.force);
+    }
+  }
+  if (const LinkLoad* link = MainLinkLoad(report)) {
+    html += Note(LinkText(*link, true) + ".") + ElectricHtml(loads, *link);
   }
   return html +
          Note(
@@ -193,10 +321,6 @@ std::string SizingHtml(const Report& report) {
 Json SizingJson(const Report& report) {
   Json motors = Json::array();
   for (const MotorLoad& load : report.motor_loads) {
-    Json uses = Json::array();
-    for (const MotorLoad::Use& use : load.uses) {
-      uses.push_back({{"of", use.of}, {"use", Number(use.use)}, {"time_s", Number(use.time_s)}});
-    }
     motors.push_back(
         {{"drive", load.drive},
          {"witness", load.witness},
@@ -218,14 +342,48 @@ Json SizingJson(const Report& report) {
           {{"driving", Number(load.energy_J)}, {"braking", Number(load.brake_energy_J)}}},
          {"current_A", {{"peak", Number(load.peak_current)}, {"rms", Number(load.rms_current)}}},
          {"voltage_V", Number(load.peak_voltage)},
+         {"electric",
+          {{"peak_W", Number(load.electric_W.size() > 0 ? load.electric_W.maxCoeff() : kNan)},
+           {"least_W", Number(load.electric_W.size() > 0 ? load.electric_W.minCoeff() : kNan)},
+           {"fed_back_J", Number(load.fed_back_J)}}},
+         {"winding",
+          {{"peak_C", Number(load.winding_peak_C)},
+           {"housing_peak_C", Number(load.housing_peak_C)},
+           {"overheated_s", Number(load.overheated_s)}}},
+         {"gearbox",
+          {{"peak", Number(load.gear_torque)},
+           {"mean", Number(load.gear_mean_torque)},
+           {"emergency", Number(load.gear_emergency_torque)}}},
+         {"brake",
+          {{"holding", Number(load.holding_torque)}, {"stop_J", Number(load.stop_energy_J)}}},
          {"inertia_ratio", Number(load.inertia_ratio)},
          {"samples_at_rest", load.samples_at_rest},
          {"unresolved", load.unresolved},
-         {"uses", std::move(uses)},
+         {"uses", UsesJson(load.uses)},
          {"limited_by", load.limited_by()},
          {"margin", Number(load.margin())}});
   }
   return motors;
+}
+
+Json LinkJson(const Report& report) {
+  Json links = Json::array();
+  for (const LinkLoad& load : report.link_loads) {
+    const MotorLoad::Use* use = LargestUse(load.uses);
+    links.push_back({{"witness", load.witness},
+                     {"peak_W", Number(load.peak_power)},
+                     {"drawn_J", Number(load.drawn_J)},
+                     {"fed_back_J", Number(load.fed_back_J)},
+                     {"capacitor_J", Number(load.capacitor_J)},
+                     {"resistor_J", Number(load.resistor_J)},
+                     {"resistor_W",
+                      {{"mean", Number(load.resistor_mean)}, {"peak", Number(load.resistor_peak)}}},
+                     {"unresolved", load.unresolved},
+                     {"uses", UsesJson(load.uses)},
+                     {"limited_by", use == nullptr ? "" : use->of},
+                     {"margin", Number(use == nullptr ? kNan : 1.0 / use->use)}});
+  }
+  return links;
 }
 
 void Widen(const Report& report, std::vector<MotorEnvelope>* envelopes) {
@@ -254,7 +412,21 @@ void Widen(const Report& report, std::vector<MotorEnvelope>* envelopes) {
   }
 }
 
-std::string ToText(const std::vector<MotorEnvelope>& envelopes) {
+void Widen(const LinkLoad& load, const std::string& scenario,
+           std::optional<LinkEnvelope>* envelope) {
+  if (!*envelope) envelope->emplace();
+  LinkEnvelope* e = &**envelope;
+  Keep(load.fed_back_J, scenario, &e->fed_back_J);
+  Keep(load.resistor_mean, scenario, &e->resistor_mean);
+  Keep(load.resistor_peak, scenario, &e->resistor_peak);
+  const MotorLoad::Use* use = LargestUse(load.uses);
+  if (use == nullptr) return;
+  e->limited = true;
+  if (use->use > e->use.value) e->limited_by = use->of;
+  Keep(use->use, scenario, &e->use);
+}
+
+Table EnvelopeTable(const std::vector<MotorEnvelope>& envelopes) {
   Table table{.columns = {Text("drive"), Digits("peak torque"), Digits("RMS torque"),
                           Digits("peak speed"), Digits("driving"), Digits("braking"),
                           Digits("margin"), Text("by")}};
@@ -266,7 +438,11 @@ std::string ToText(const std::vector<MotorEnvelope>& envelopes) {
                           e.limited ? fmt::format("{:.3g}", e.margin()) : "–",
                           e.limited ? fmt::format("{}, {}", e.limited_by, e.use.scenario) : ""});
   }
-  std::string text = ToText(table, {.indent = ""});
+  return table;
+}
+
+std::string ToText(const std::vector<MotorEnvelope>& envelopes) {
+  std::string text = ToText(EnvelopeTable(envelopes), {.indent = ""});
   for (const MotorEnvelope& e : envelopes) {
     if (e.unresolved.empty()) continue;
     text += fmt::format("{}: torque, power and margin not known between the samples: {}\n", e.drive,
@@ -275,7 +451,21 @@ std::string ToText(const std::vector<MotorEnvelope>& envelopes) {
   return text;
 }
 
+std::string ToText(const LinkEnvelope& link) {
+  const auto most = [](const MotorEnvelope::Most& m, const char* unit) {
+    return WithUnit(m.value, unit) + (m.scenario.empty() ? "" : " (" + m.scenario + ")");
+  };
+  return fmt::format(
+      "DC link: fed back {}, resistor mean {}, peak {}; margin {}\n", most(link.fed_back_J, "J"),
+      most(link.resistor_mean, "W"), most(link.resistor_peak, "W"),
+      !link.limited ? "–"
+      : link.limited_by.empty()
+          ? "–, not used"
+          : fmt::format("{:.3g} ({}, {})", link.margin(), link.limited_by, link.use.scenario));
+}
+
 std::string ToJson(const std::vector<MotorEnvelope>& envelopes,
+                   const std::optional<LinkEnvelope>& link,
                    const std::vector<std::string>& scenarios) {
   Json motors = Json::array();
   for (const MotorEnvelope& e : envelopes) {
@@ -292,8 +482,19 @@ std::string ToJson(const std::vector<MotorEnvelope>& envelopes,
                       {"unresolved", e.unresolved},
                       {"margin", Number(e.limited ? e.margin() : kNan)}});
   }
-  const Json json = {
-      {"schema", "mbverify.sizing/1"}, {"scenarios", scenarios}, {"motors", std::move(motors)}};
+  Json dc_link;
+  if (link) {
+    dc_link = {{"fed_back_J", MostJson(link->fed_back_J)},
+               {"resistor_mean_W", MostJson(link->resistor_mean)},
+               {"resistor_peak_W", MostJson(link->resistor_peak)},
+               {"use", MostJson(link->use)},
+               {"limited_by", link->limited_by},
+               {"margin", Number(link->limited ? link->margin() : kNan)}};
+  }
+  const Json json = {{"schema", "mbverify.sizing/1"},
+                     {"scenarios", scenarios},
+                     {"motors", std::move(motors)},
+                     {"dc_link", std::move(dc_link)}};
   return Dump(json);
 }
 

@@ -444,6 +444,41 @@ ComparisonInput InputOf(const Prepared& prepared) {
           .unchecked_coverage = prepared.closed_form.unchecked};
 }
 
+// At rest an acceleration that equals the velocity takes the momentum p = M v, and the drives
+// accelerate by v.
+std::vector<DriveFacts> DriveFactsOf(const Prepared& prepared) {
+  const std::vector<Motor>& motors = prepared.base.motors;
+  const Motion& motion = prepared.scenario.motion;
+  std::vector<DriveFacts> facts(motors.size());
+  const auto brakes = [](const Motor& motor) { return motor.brake.has_value(); };
+  if (motion.free() || std::ranges::none_of(motors, brakes)) return facts;
+  ReferenceSolver solver(prepared.mechanisms.reference, motion, {.explain_unreached = false});
+  const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
+  for (DriveFacts& fact : facts) {
+    fact.at_rest.force.resize(static_cast<Eigen::Index>(times.size()));
+    fact.at_rest.energy_J.resize(static_cast<Eigen::Index>(times.size()));
+  }
+  CommandSample command;
+  ReferenceSample rests, moves;
+  for (size_t i = 0; i < times.size(); ++i) {
+    EvaluateMotion(motion, times[i], &command);
+    const VecX rate = command.velocity;
+    command.velocity.setZero();
+    command.acceleration.setZero();
+    if (!solver.Dynamics(command, &rests).ok()) return std::vector<DriveFacts>(motors.size());
+    command.acceleration = rate;
+    if (!solver.Dynamics(command, &moves).ok()) return std::vector<DriveFacts>(motors.size());
+    for (size_t k = 0; k < motors.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const int d = motors[k].drive;
+      const double momentum = moves.drive_force[d] - rests.drive_force[d];
+      facts[k].at_rest.force[row] = rests.drive_force[d];
+      facts[k].at_rest.energy_J[row] = 0.5 * momentum * moves.driven.acceleration[d];
+    }
+  }
+  return facts;
+}
+
 void InScenarioTime(const Scenario& scenario, RunSummary* summary, Trace* trace) {
   if (!scenario.phase || scenario.phase->from_s == 0.0) return;
   const double from_s = scenario.phase->from_s, sample_s = scenario.motion.sample_s;

@@ -174,6 +174,10 @@ class WitnessRunner {
 /// scenario, also where it is a phase (InScenarioTime()).
 [[nodiscard]] ComparisonInput InputOf(const Prepared& prepared);
 
+/// By motor: what holding brakes bear along the motion, by the reference. Nothing where no motor
+/// has one, of a free motion, and where the reference does not get through the motion.
+[[nodiscard]] std::vector<DriveFacts> DriveFactsOf(const Prepared& prepared);
+
 /// Moves what a witness recorded of a phase, which begins at 0, to the scenario's time.
 void InScenarioTime(const Scenario& scenario, RunSummary* summary, Trace* trace);
 

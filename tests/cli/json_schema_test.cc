@@ -76,6 +76,7 @@ constexpr Call kCalls[] = {
      "--out OUT/x",
      0},
     {"size slider_crank/buffer", 0},
+    {"size slider_crank/press --choose scenarios/slider_crank/catalogue.yaml --out OUT/size", 0},
     {"size four_bar/turn", 2},
     {"figures four_bar/turn --only drive_torques --out OUT/figures", 0},
     {"figures OUT/bad.yaml --out OUT/figures", 2},

@@ -166,7 +166,7 @@ TEST(ForceBand, AMotorBearsTheWorseEnd) {
   motor.drive = 0;
   motor.turns = false;
   motor.peak = 500.0;
-  const MotorLoad load = MotorLoadOf(c.mechanism, motor, c.reference);
+  const MotorLoad load = MotorLoadOf("d1", motor, c.reference);
   const VecX force = c.reference.values.col(c.reference.Find("d1.force"));
   EXPECT_NEAR(std::abs(load.peak_torque),
               300.0 + force.segment(kFrom, kTo - kFrom).cwiseAbs().maxCoeff(), 1e-9);

@@ -33,7 +33,14 @@ Trace SineTrace(double phase = 0.0, int samples = 4000) {
 }
 
 MotorLoad LoadOf(const Motor& motor, const Trace& trace) {
-  return MotorLoadOf(synthetic::TwoSliders(), motor, trace, 12.0);
+  return MotorLoadOf("d1", motor, trace, {.load_inertia = 12.0});
+}
+
+double UseOf(const std::vector<MotorLoad::Use>& uses, const std::string& of) {
+  for (const MotorLoad::Use& use : uses) {
+    if (use.of == of) return use.use;
+  }
+  return kNan;
 }
 
 Motor Plain() {
@@ -186,18 +193,227 @@ TEST(MotorLoad, SpeedsCurrentsAndVoltageAreLimits) {
   motor.continuous_current = 4.0;
   motor.peak_current = 5.0;
   const MotorLoad load = LoadOf(motor, SineTrace());
-  const auto use = [&](const std::string& of) {
-    for (const MotorLoad::Use& u : load.uses) {
-      if (u.of == of) return u.use;
-    }
-    return kNan;
-  };
+  const auto use = [&](const std::string& of) { return UseOf(load.uses, of); };
   EXPECT_NEAR(use("speed"), 0.75, 1e-12);
   EXPECT_NEAR(use("rated speed"), 2 * kV / pi / 25.0, 1e-5);
   EXPECT_NEAR(use("continuous current"), kA / std::sqrt(2.0) / 0.5 / 4.0, 1e-12);
   EXPECT_NEAR(use("peak current"), kA / 0.5 / 5.0, 1e-12);
   EXPECT_NEAR(use("voltage"), (2.0 * 4.0 + 0.5 * 30.0) / 25.0, 1e-12);
   EXPECT_STREQ(load.limited_by(), "voltage");
+}
+
+// A winding that a torque heats for `on_s` of every `period_s`: R = 2 Ω, k_t = 0.5.
+struct RepeatedStep {
+  double on_s = 12.0, period_s = 30.0, torque = 3.0;
+
+  [[nodiscard]] double loss_W() const { return 2.0 * torque * torque / 0.25; }
+  // The torque ends within 1e-9 s: the trapezoidal rule heats by as much too long, at most.
+  [[nodiscard]] Trace ToTrace() const {
+    std::vector<double> times;
+    for (int i = 0; i <= 12; ++i) times.push_back(on_s * i / 12.0);
+    times.push_back(on_s + 1e-9);
+    for (int i = 1; i <= 6; ++i) times.push_back(on_s + (period_s - on_s) * i / 6.0);
+    Trace trace;
+    trace.Reset(times, DriveChannels(synthetic::TwoSliders()));
+    trace.values.setZero();
+    trace.values.col(trace.Find("d1.force")).head(13).setConstant(torque);
+    return trace;
+  }
+};
+
+Motor Heated() {
+  Motor motor = Plain();
+  motor.torque_constant = 0.5;
+  motor.resistance = 2.0;
+  motor.thermal = MotorThermal{.winding_to_housing = 0.8,
+                               .housing_to_ambient = 2.0,
+                               .winding_time = 20.0,
+                               .housing_time = 600.0,
+                               .ambient_C = 30.0,
+                               .max_winding_C = 130.0};
+  return motor;
+}
+
+// The closed form: a step of the loss P heats the winding by P Σ a_k (1 − e^(−t/T_k)), with the
+// roots 1/T_k of the network's characteristic polynomial. Of steps that repeat for ever, what they
+// leave at their ends is a geometric series: P Σ a_k (1 − e^(−on/T_k)) / (1 − e^(−period/T_k)).
+double RepeatedStepPeak(const RepeatedStep& step, const MotorThermal& t) {
+  const double R1 = t.winding_to_housing, R2 = t.housing_to_ambient;
+  const double C1 = t.winding_time / R1, C2 = t.housing_time / R2;
+  const double b = 1 / (R1 * C1) + 1 / (R1 * C2) + 1 / (R2 * C2), c = 1 / (R1 * C1 * R2 * C2);
+  const double root = std::sqrt(b * b - 4 * c);
+  const double s1 = (b + root) / 2, s2 = (b - root) / 2;
+  // Step response with w(∞) = R1 + R2 and w'(0) = 1/C1.
+  const double a2 = (1 / C1 - s1 * (R1 + R2)) / (s2 - s1), a1 = R1 + R2 - a2;
+  const auto share = [&](double s) {
+    return (1 - std::exp(-s * step.on_s)) / (1 - std::exp(-s * step.period_s));
+  };
+  return t.ambient_C + step.loss_W() * (a1 * share(s1) + a2 * share(s2));
+}
+
+TEST(MotorLoad, ARepeatedStepHeatsTheWindingAsItsClosedFormDoes) {
+  const RepeatedStep step;
+  const Motor motor = Heated();
+  const double peak = RepeatedStepPeak(step, *motor.thermal);
+  const MotorLoad load = LoadOf(motor, step.ToTrace());
+  // 1e-9 s of the loss too much per 30 s: 1e-9 of the rise, and round-off.
+  const double tolerance = 2e-9 * (peak - 30.0);
+  EXPECT_NEAR(load.winding_peak_C, peak, tolerance);
+  EXPECT_NEAR(UseOf(load.uses, "winding temperature"), (peak - 30.0) / 100.0, tolerance / 100.0);
+  EXPECT_LT(load.housing_peak_C, load.winding_peak_C);
+  // A perturbed network is not it.
+  for (double MotorThermal::*number :
+       {&MotorThermal::winding_to_housing, &MotorThermal::housing_to_ambient,
+        &MotorThermal::winding_time, &MotorThermal::housing_time}) {
+    Motor other = motor;
+    (*other.thermal).*number *= 1.0 + 1e-4;
+    EXPECT_GT(std::abs(LoadOf(other, step.ToTrace()).winding_peak_C - peak), 2 * tolerance);
+  }
+}
+
+// Constant torque: w = (R1 + R2) P (1 + α (w − 25 + ambient)): losses grow, and run away where the
+// loop gain α P (R1 + R2) reaches 1.
+TEST(MotorLoad, LossesGrowWithTheWindingUntilTheyRunAway) {
+  Motor motor = Heated();
+  motor.thermal->resistance_growth = 0.0039;
+  for (const double gain : {0.5, 0.99, 1.0, 1.01}) {
+    const double loss_W = gain / (0.0039 * 2.8);
+    const RepeatedStep step{
+        .on_s = 29.0, .period_s = 30.0, .torque = 0.5 * std::sqrt(loss_W / 2.0)};
+    Trace trace = step.ToTrace();
+    trace.values.col(trace.Find("d1.force")).setConstant(step.torque);
+    const MotorLoad load = LoadOf(motor, trace);
+    if (gain >= 1.0) {
+      EXPECT_TRUE(std::isinf(load.winding_peak_C) || load.winding_peak_C > 1e9) << gain;
+      EXPECT_LT(load.margin(), 1e-6);
+      EXPECT_GT(load.overheated_s, 0.0);
+      continue;
+    }
+    const double rise = 2.8 * loss_W * (1.0 + 0.0039 * (30.0 - 25.0)) / (1.0 - gain);
+    EXPECT_NEAR(load.winding_peak_C, 30.0 + rise, 1e-8 * rise) << gain;
+  }
+}
+
+// The time from ambient temperature to the limit, by stepping cycle after cycle.
+TEST(MotorLoad, TheTimeToTheLimitIsFound) {
+  const RepeatedStep step;
+  Motor motor = Heated();
+  const double peak = LoadOf(motor, step.ToTrace()).winding_peak_C;
+  EXPECT_TRUE(std::isnan(LoadOf(motor, step.ToTrace()).overheated_s) == (peak <= 130.0));
+  motor.thermal->max_winding_C = 30.0 + 0.9 * (peak - 30.0);
+  const double found_s = LoadOf(motor, step.ToTrace()).overheated_s;
+  // Explicit Euler with steps of 1 ms, at the samples of the step: one a second while it heats.
+  double w = 0.0, h = 0.0, t_s = 0.0;
+  const double C1 = 20.0 / 0.8, C2 = 600.0 / 2.0;
+  for (long k = 0; w + 30.0 <= motor.thermal->max_winding_C; ++k) {
+    t_s = static_cast<double>(k) * 1e-3;
+    const double P = std::fmod(t_s, 30.0) < 12.0 ? step.loss_W() : 0.0;
+    const double flow = (w - h) / 0.8;
+    w += 1e-3 * (P - flow) / C1;
+    h += 1e-3 * (flow - h / 2.0) / C2;
+  }
+  EXPECT_GE(found_s, t_s - 0.1);
+  EXPECT_LE(found_s, t_s + 1.1);
+}
+
+// v = V sin, F = A sin: the mean of power p over revolutions is A (∫ sin^(p+1) / ∫ sin)^(1/p); with
+// p = 3 over half a period (3π/8)/2.
+TEST(MotorLoad, AGearboxBearsPeakMeanAndSpeeds) {
+  Motor motor = Plain();
+  motor.gear_ratio = 10.0;
+  motor.gearbox = MotorGearbox{.mean_torque = 4.0,
+                               .peak_torque = 5.0,
+                               .emergency_torque = 8.0,
+                               .mean_speed = 250.0,
+                               .max_speed = 400.0};
+  const MotorLoad load = LoadOf(motor, SineTrace());
+  const double mean = kA * std::cbrt(3 * pi / 16);
+  EXPECT_NEAR(load.gear_mean_torque, mean, 1e-6);
+  EXPECT_NEAR(UseOf(load.uses, "gearbox mean torque"), mean / 4.0, 1e-6);
+  EXPECT_NEAR(UseOf(load.uses, "gearbox peak"), kA / 5.0, 1e-12);
+  EXPECT_NEAR(UseOf(load.uses, "gearbox emergency"), kA / 8.0, 1e-12);
+  EXPECT_NEAR(UseOf(load.uses, "gearbox speed"), 10 * kV / 400.0, 1e-12);
+  EXPECT_NEAR(UseOf(load.uses, "gearbox mean speed"), 20 * kV / pi / 250.0, 1e-5);
+  // ∫ sin^(13/3) = √π Γ(8/3)/Γ(19/6) over half a period; not the mean of power 3.
+  motor.gearbox->exponent = 10.0 / 3.0;
+  const double integral = std::sqrt(pi) * std::tgamma(8.0 / 3.0) / std::tgamma(19.0 / 6.0);
+  const MotorLoad bearing = LoadOf(motor, SineTrace());
+  EXPECT_NEAR(bearing.gear_mean_torque, kA * std::pow(integral / 2.0, 0.3), 1e-6);
+  EXPECT_GT(bearing.gear_mean_torque - mean, 1e-3);
+  // A brake on the motor's shaft stops the drive through the gear.
+  motor.efficiency = 0.8;
+  motor.brake = MotorBrake{.torque = 0.6};
+  EXPECT_NEAR(LoadOf(motor, SineTrace()).gear_emergency_torque, 0.6 * 10 / 0.8, 1e-12);
+  // The torque of a gearbox before a spindle.
+  motor.spindle = 5.0;
+  EXPECT_NEAR(LoadOf(motor, SineTrace()).gear_torque, kA / 5.0, 1e-12);
+}
+
+TEST(MotorLoad, ABrakeHoldsAndStops) {
+  Motor motor = Plain();
+  motor.gear_ratio = 10.0;
+  motor.efficiency = 0.8;
+  motor.rotor_inertia = 1e-4;
+  motor.brake = MotorBrake{.torque = 0.5, .energy = 20.0};
+  const Trace trace = SineTrace();
+  DriveFacts facts;
+  facts.at_rest.force = VecX::Constant(trace.values.rows(), -4.0);
+  facts.at_rest.energy_J = 0.5 * 0.02 * trace.values.col(trace.Find("d1.velocity")).cwiseAbs2();
+  const MotorLoad load = MotorLoadOf("d1", motor, trace, facts);
+  EXPECT_NEAR(load.holding_torque, 4.0 * 0.8 / 10.0, 1e-12);
+  EXPECT_NEAR(UseOf(load.uses, "holding brake"), 0.32 / 0.5, 1e-12);
+  // Rotor and load at full speed, braked with what is left of 0.5 N m.
+  const double energy = (0.5 * 1e-4 * 1e2 + 0.8 * 0.5 * 0.02) * kV * kV * 0.5 / (0.5 - 0.32);
+  EXPECT_NEAR(load.stop_energy_J, energy, 1e-9);
+  EXPECT_NEAR(UseOf(load.uses, "brake energy"), energy / 20.0, 1e-9);
+  // It stops nothing that it does not hold.
+  motor.brake->torque = 0.32 * (1 - 1e-9);
+  EXPECT_TRUE(std::isinf(MotorLoadOf("d1", motor, trace, facts).stop_energy_J));
+  EXPECT_LT(MotorLoadOf("d1", motor, trace, facts).margin(), 1e-12);
+  // Nothing is known without the reference.
+  EXPECT_TRUE(std::isnan(LoadOf(motor, trace).holding_torque));
+}
+
+// A quarter of a period late: per half wave A V T/2π comes back, four of them in two periods.
+TEST(MotorLoad, TheLinkKeepsWhatItsCapacitorTakesAndBurnsTheRest) {
+  const Trace trace = SineTrace(pi / 2);
+  const double half_wave_J = kA * kV / (4 * pi);
+  const std::vector<MotorLoad> loads = {LoadOf(Plain(), trace)};
+  EXPECT_NEAR(loads[0].fed_back_J, 4 * half_wave_J, 1e-3);
+  const auto with_room = [&](double room_J, double efficiency) {
+    DcLink link{.efficiency = efficiency,
+                .capacitance = room_J > 0.0 ? 1e-3 : 0.0,
+                .voltage = 300.0,
+                .mean_power = 10.0,
+                .peak_power = 40.0};
+    link.brake_voltage = std::sqrt(300.0 * 300.0 + 2e3 * room_J);
+    return *LinkLoadOf(link, loads);
+  };
+  const LinkLoad burnt = with_room(0.0, 1.0);
+  EXPECT_NEAR(burnt.resistor_J, 4 * half_wave_J, 1e-3);
+  EXPECT_NEAR(burnt.resistor_mean, 2 * half_wave_J, 1e-3);
+  EXPECT_NEAR(burnt.resistor_peak, 0.5 * kA * kV, 1e-3);
+  EXPECT_NEAR(UseOf(burnt.uses, "brake resistor, mean"), 2 * half_wave_J / 10.0, 1e-4);
+  EXPECT_NEAR(UseOf(burnt.uses, "brake resistor, peak"), 0.5 * kA * kV / 40.0, 1e-4);
+  const LinkLoad half = with_room(0.5 * half_wave_J, 1.0);
+  EXPECT_NEAR(half.resistor_J, 2 * half_wave_J, 2e-3);
+  EXPECT_NEAR(half.capacitor_J, 2 * half_wave_J, 2e-3);
+  const LinkLoad kept = with_room(half_wave_J * 1.001, 1.0);
+  EXPECT_EQ(kept.resistor_J, 0.0);
+  // Inverters take their share both ways.
+  EXPECT_NEAR(with_room(0.0, 0.9).fed_back_J, 0.9 * 4 * half_wave_J, 1e-3);
+  EXPECT_NEAR(with_room(0.0, 0.9).drawn_J, 4 * half_wave_J / 0.9, 1e-3);
+}
+
+// Copper losses R i² are drawn while the motor brakes, too: P = A V sin cos + R (A cos / k)².
+TEST(MotorLoad, LossesTakeFromWhatIsFedBack) {
+  Motor motor = Plain();
+  motor.torque_constant = 0.5;
+  motor.resistance = 1e-4;
+  const double lossless = LoadOf(Plain(), SineTrace(pi / 2)).fed_back_J;
+  const double less = lossless - LoadOf(motor, SineTrace(pi / 2)).fed_back_J;
+  // To first order half of the losses of 2 s, R A²/k²/2 each second.
+  EXPECT_NEAR(less, 1e-4 * kA * kA / 0.25 / 2.0, 2e-6);
 }
 
 // The drives of three witnesses that agree: 100 N at most on d1.

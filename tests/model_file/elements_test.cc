@@ -231,7 +231,7 @@ TEST(StopsAndCurves, AreReadWrittenAndReadAgain) {
       " interpolation: linear, beyond: linear}\n"
       "  fan: {kind: curve, joint: turn, of: rate, points_rpm: [[0, 0], [60, -2], [120, -8]],"
       " beyond: linear}\n"
-      "  J: {kind: rotor, joint: turn, inertia_kgcm2: 3}\n";
+      "  J: {kind: rotor, joint: turn, inertia_kg_cm2: 3}\n";
   const LoadResult loaded = LoadModelText(WithElements(lines), "m.yaml");
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "report/sections.h"
 
 namespace mbv {
@@ -72,6 +74,51 @@ TEST(Sizing, ALinePerMotorAndAllFiguresOnDemand) {
   EXPECT_TRUE(SizingLines(Report(), true).empty());
 }
 
+// Only what the motor states is reported.
+TEST(Sizing, WindingGearboxBrakeAndLinkAreReported) {
+  Report report = Sized("a", 3.2, 0.8);
+  MotorLoad& load = report.motor_loads[0];
+  load.winding_peak_C = 120.5;
+  load.housing_peak_C = 80.0;
+  load.overheated_s = 900.0;
+  load.gear_torque = 20.0;
+  load.gear_mean_torque = 12.0;
+  load.gear_emergency_torque = 30.0;
+  load.holding_torque = 0.4;
+  load.stop_energy_J = std::numeric_limits<double>::infinity();
+  report.link_loads = {{.witness = "reference",
+                        .peak_power = 50.0,
+                        .drawn_J = 9.0,
+                        .fed_back_J = 3.0,
+                        .capacitor_J = 1.0,
+                        .resistor_J = 2.0,
+                        .resistor_mean = 2.0,
+                        .resistor_peak = 8.0,
+                        .uses = {{"brake resistor, mean", 0.5, kNan}}}};
+  const std::string text = Joined(SizingLines(report, true));
+  for (const char* line :
+       {"  winding of the repeated motion: at most 120.5 °C, housing 80 °C; repeated from ambient "
+        "temperature, it is too hot after 900 s\n",
+        "  gearbox, at its output: peak 20 N m, mean 12 N m, emergency 30 N m\n",
+        "  brake: holds 0.4 N m, one stop is not possible\n",
+        "DC link: margin 2 (brake resistor, mean)\n  drawn 9 J per cycle, at most 50 W; fed back 3 "
+        "J: capacitor 1 J, resistor 2 J\n  resistor: mean 2 W, peak 8 W; used: brake resistor, "
+        "mean 50 %\n"}) {
+    EXPECT_NE(text.find(line), std::string::npos) << line << text;
+  }
+  EXPECT_NE(SizingHtml(report).find("brake: holds 0.4 N m"), std::string::npos);
+  EXPECT_EQ(SizingJson(report)[0]["gearbox"]["mean"], 12.0);
+  EXPECT_EQ(LinkJson(report)[0]["resistor_W"]["peak"], 8.0);
+  std::optional<LinkEnvelope> link;
+  Widen(report.link_loads[0], "a", &link);
+  LinkLoad more = report.link_loads[0];
+  more.uses[0].use = 0.8;
+  Widen(more, "b", &link);
+  EXPECT_EQ(ToText(*link),
+            "DC link: fed back 3 J (a), resistor mean 2 W (a), peak 8 W (a); margin 1.25 (brake "
+            "resistor, mean, b)\n");
+}
+
 TEST(Sizing, TheJsonHasEveryWitness) {
   const auto json = SizingJson(Sized("a", 3.2, 0.8));
   ASSERT_EQ(json.size(), 2u);
@@ -103,7 +150,7 @@ TEST(Sizing, EnvelopesNameTheScenarioThatAsksForMost) {
   EXPECT_EQ(envelopes[0].brake_power.value, 2.0);
   EXPECT_DOUBLE_EQ(envelopes[0].margin(), 0.8);
   EXPECT_NE(ToText(envelopes).find("0.8  peak, fast"), std::string::npos) << ToText(envelopes);
-  const std::string json = ToJson(envelopes, {"slow", "fast"});
+  const std::string json = ToJson(envelopes, {}, {"slow", "fast"});
   EXPECT_NE(json.find("\"schema\": \"mbverify.sizing/1\""), std::string::npos);
   EXPECT_NE(json.find("\"margin\": 0.8"), std::string::npos) << json;
 }

@@ -160,6 +160,7 @@ PerturbedRun MutationBench::Judge(WitnessRuns runs, const Scenario& scenario) co
   perturbed.failure = WhyNothing(runs, scenario.simulation.ignore_ranges);
   if (!perturbed.failure.empty()) return perturbed;
   ComparisonInput input = InputOf(prepared_);
+  input.drive_facts = DriveFactsOf(prepared_);
   input.reactions_not_unique = reactions_not_unique_;
   truths_.HandOver(&input);
   runs.HandOver(&input);

@@ -7,6 +7,7 @@
 
 #include "base/text.h"
 #include "comparison/metrics.h"
+#include "report/sizing.h"
 
 namespace mbv {
 namespace {
@@ -261,6 +262,42 @@ void Join(WitnessRecord&& more, std::vector<WitnessRecord>* all) {
   Append(std::move(more.summary), &known->summary);
 }
 
+// Motors over the joined traces; a row between two phases is that of the phase that begins.
+void SizeMotors(const Mechanism& mechanism, const std::vector<PhaseRun>& runs, Report* all) {
+  std::vector<DriveFacts> facts(mechanism.motors.size());
+  const auto append = [&](const Report& report, bool last, size_t k) {
+    if (k >= report.drive_facts.size()) return;
+    const DriveAtRest& more = report.drive_facts[k].at_rest;
+    DriveAtRest* rest = &facts[k].at_rest;
+    const Eigen::Index at = rest->force.size(), rows = more.force.size() - (last ? 0 : 1);
+    if (rows <= 0) return;
+    for (const auto& [from, to] :
+         {std::pair{&more.force, &rest->force}, std::pair{&more.energy_J, &rest->energy_J}}) {
+      to->conservativeResize(at + rows);
+      to->tail(rows) = from->head(rows);
+    }
+  };
+  for (size_t k = 0; k < facts.size(); ++k) {
+    append(*all, runs.size() == 1, k);
+    for (size_t r = 1; r < runs.size(); ++r) append(runs[r].report, r + 1 == runs.size(), k);
+  }
+  std::vector<MotorLoad> before = std::move(all->motor_loads);
+  all->motor_loads.clear();
+  all->link_loads.clear();
+  all->drive_facts = facts;
+  for (const WitnessRecord& record : all->witnesses) {
+    const auto measured = std::ranges::find(before, record.name, &MotorLoad::witness);
+    if (measured == before.end()) continue;
+    std::string unresolved = measured->unresolved;
+    for (const PhaseRun& run : runs) {
+      for (const MotorLoad& part : run.report.motor_loads) {
+        if (part.witness == record.name && unresolved.empty()) unresolved = part.unresolved;
+      }
+    }
+    AddMotorLoads(mechanism, record, unresolved, all);
+  }
+}
+
 }  // namespace
 
 Report JoinPhases(const Mechanism& mechanism, std::vector<PhaseRun>* runs) {
@@ -298,22 +335,7 @@ Report JoinPhases(const Mechanism& mechanism, std::vector<PhaseRun>* runs) {
       force.change_max = std::max(force.change_max, other.change_max);
     }
   }
-  for (MotorLoad& load : all.motor_loads) {
-    const int drive = mechanism.FindDrive(load.drive);
-    const auto motor = std::ranges::find(mechanism.motors, drive, &Motor::drive);
-    const Trace* trace = TraceOf(all, load.witness);
-    if (motor == mechanism.motors.end() || trace == nullptr) continue;
-    MotorLoad whole = MotorLoadOf(mechanism, *motor, *trace);
-    whole.witness = load.witness;
-    whole.unresolved = load.unresolved;
-    for (const PhaseRun& run : *runs) {
-      for (const MotorLoad& part : run.report.motor_loads) {
-        const bool same = part.drive == load.drive && part.witness == load.witness;
-        if (same && whole.unresolved.empty()) whole.unresolved = part.unresolved;
-      }
-    }
-    load = std::move(whole);
-  }
+  SizeMotors(mechanism, *runs, &all);
   all.comparison = std::move(comparison);
   all.phases = std::move(phases);
   all.duration_s = runs->back().phase.end_s;

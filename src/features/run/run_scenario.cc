@@ -36,6 +36,7 @@
 #include "report/html_report.h"
 #include "report/report.h"
 #include "report/singular_poses.h"
+#include "report/sizing.h"
 #include "scenario/find_model.h"
 #include "scenario/tables/table.h"
 #include "verify/check_file.h"
@@ -460,6 +461,7 @@ class ScenarioRun {
       AddWarning(text);
     }
     ComparisonInput input = InputOf(*prepared_);
+    input.drive_facts = report_.drive_facts = DriveFactsOf(*prepared_);
     runs_.HandOver(&input);
     input.reactions_not_unique = ReactionsNotUnique(
         base(), runs_.simulation ? runs_.simulation->X_WB : std::vector<std::vector<Pose>>());
@@ -561,20 +563,16 @@ class ScenarioRun {
     const Mechanism& mechanism = base();
     const ComparisonInput input = InputOf(*prepared_);
     report_.motors = mechanism.motors;
-    std::vector<double> inertias;
-    for (const Motor& motor : mechanism.motors) {
-      const bool needed = motor.rotor_inertia > 0.0;
-      inertias.push_back(needed ? LoadInertia(mechanism, motor.drive) : kNan);
+    report_.dc_link = mechanism.dc_link;
+    for (size_t k = 0; k < mechanism.motors.size(); ++k) {
+      const Motor& motor = mechanism.motors[k];
+      if (!(motor.rotor_inertia > 0.0)) continue;
+      report_.drive_facts[k].load_inertia = LoadInertia(mechanism, motor.drive);
     }
     for (const WitnessRecord& record : report_.witnesses) {
       if (!record.summary.ok() || record.trace.time_s.empty() || mechanism.motors.empty()) continue;
       const std::string unresolved = UnresolvedBySamples(input, record.trace);
-      for (size_t k = 0; k < mechanism.motors.size(); ++k) {
-        MotorLoad load = MotorLoadOf(mechanism, mechanism.motors[k], record.trace, inertias[k]);
-        load.witness = record.name;
-        load.unresolved = unresolved;
-        if (load.known()) report_.motor_loads.push_back(std::move(load));
-      }
+      AddMotorLoads(mechanism, record, unresolved, &report_);
     }
   }
 

@@ -435,6 +435,7 @@ class CheckMeter {
  public:
   explicit CheckMeter(const StudyRun& run) : run_(run), input_(InputOf(*run.prepared)) {
     run.runs.HandOver(&input_);
+    input_.drive_facts = DriveFactsOf(*run.prepared);
     input_.reactions_not_unique = ReactionsNotUnique(
         run.prepared->base,
         run.runs.simulation ? run.runs.simulation->X_WB : std::vector<std::vector<Pose>>());
@@ -476,16 +477,19 @@ class CheckMeter {
   }
 
   [[nodiscard]] double SmallestMargin() const {
-    double smallest = kNan;
+    double largest = kNan;
+    const auto keep = [&](std::span<const MotorLoad::Use> uses) {
+      const MotorLoad::Use* use = LargestUse(uses);
+      if (use != nullptr && !(use->use <= largest)) largest = use->use;
+    };
     const Mechanism& mechanism = run_.prepared->base;
     for (const WitnessRecord* record : run_.witnesses) {
-      for (const Motor& motor : mechanism.motors) {
-        const MotorLoad load = MotorLoadOf(mechanism, motor, record->trace);
-        if (!load.known() || std::isnan(load.largest_use())) continue;
-        if (!(load.margin() >= smallest)) smallest = load.margin();
-      }
+      const auto loads = MotorLoadsOf(mechanism, record->trace, input_.drive_facts);
+      for (const MotorLoad& load : loads) keep(load.uses);
+      if (!mechanism.dc_link) continue;
+      if (const auto link = LinkLoadOf(*mechanism.dc_link, loads)) keep(link->uses);
     }
-    return smallest;
+    return 1.0 / largest;
   }
 
   const StudyRun& run_;

@@ -16,9 +16,9 @@
 #include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
+#include "model_file/catalogue.h"
 #include "model_file/element_text.h"
 #include "model_file/model_contacts.h"
-#include "model_file/model_drives.h"
 #include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
 
@@ -732,7 +732,7 @@ class Companion {
     for (const Motor& motor : m_.motors) {
       sections_["motors"] +=
           fmt::format("  {}: {{{}}}\n", YamlName(m_.drives[static_cast<size_t>(motor.drive)].name),
-                      internal::MotorText(motor));
+                      MotorText(motor));
     }
   }
 

@@ -31,11 +31,13 @@ inline constexpr UnitSuffix kDeg{"_deg", "rad", FromDegrees};
 inline constexpr UnitSuffix kMm{"_mm", "m", FromMillimetres};
 inline constexpr UnitSuffix kRpm{
     "_rpm", "rad/s", [](double value) { return value * std::numbers::pi / 30.0; }};
-/// Of what data sheets state: N/mm and N s/mm, N m/° and N m s/°, kg cm².
+/// Units of data sheets: N/mm and N s/mm, N m/° and N m s/°, and others.
 inline constexpr UnitSuffix kPerMm{"_per_mm", "m", [](double value) { return value * 1e3; }};
 inline constexpr UnitSuffix kPerDeg{"_per_deg", "rad",
                                     [](double value) { return value / FromDegrees(1.0); }};
-inline constexpr UnitSuffix kKgCm2{"_kgcm2", "", [](double value) { return value / 1e4; }};
+inline constexpr UnitSuffix kKgCm2{"_kg_cm2", "kg m²", [](double value) { return value / 1e4; }};
+inline constexpr UnitSuffix kNcm{"_N_cm", "N m", [](double value) { return value / 100.0; }};
+inline constexpr UnitSuffix kMnm{"_mN_m", "N m", [](double value) { return value / 1000.0; }};
 
 /// A name, and the unit that its end states.
 struct NameInUnit {

@@ -1,5 +1,6 @@
 // mbverify size, run --sizing and checks: {motor_margin} as a user types them, with forces by hand:
 // 2 kg on a sine of 0.1 m ask for 0.2 (2π/T)² N.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -168,6 +169,153 @@ TEST_F(SizeCommand, TheInertiaRatioIsThatOfTheLoadAtHome) {
   const auto summary = nlohmann::json::parse(ReadAll(File("out") + "/cart/fast/summary.json"));
   const double lever = 0.01 / (2 * std::numbers::pi);
   EXPECT_NEAR(summary["motors"][0]["inertia_ratio"].get<double>(), 2 * lever * lever / 1e-6, 1e-6);
+}
+
+// 3 kg hang on a vertical slide behind a spindle of 10 mm per turn: 29.43 N · 0.01/2π.
+class SizeBrake : public SizeCommand {
+ protected:
+  void Hang(const std::string& motor, const std::string& more = "") const {
+    Write("model.yaml",
+          "name: lift\nbodies: {cart: {mass: 3, inertia: [1, 1, 1]}}\n"
+          "joints: {slide: {kind: prismatic, parent: world, child: cart, axis: z}}\n"
+          "drives: {x: {kind: joint, joint: slide}}\nmotors: {x: {lead_mm: 10, " +
+              motor + "}}\n" + more);
+  }
+  static constexpr double kHold = 3 * 9.81 * 0.01 / (2 * std::numbers::pi);
+};
+
+TEST_F(SizeBrake, TheReferenceFindsWhatTheBrakeHoldsAndStops) {
+  Hang("brake: {torque: 0.1, energy: 1}, rotor_inertia: 1e-6");
+  const std::string run = "run " + File("fast.yaml") + Out() + " --no-report --no-pictures";
+  EXPECT_EQ(mbverify(run).exit_code, 0);
+  const auto motor =
+      nlohmann::json::parse(ReadAll(File("out") + "/lift/fast/summary.json"))["motors"][0];
+  EXPECT_NEAR(motor["brake"]["holding"].get<double>(), kHold, 1e-12);
+  // At the largest speed 0.2π m/s: 1.5 v² of the cart, rotor, and what is left of the torque.
+  const double v = 0.1 * 2 * std::numbers::pi, turns = v * 2 * std::numbers::pi / 0.01;
+  const double energy = (1.5 * v * v + 0.5e-6 * turns * turns) * 0.1 / (0.1 - kHold);
+  EXPECT_NEAR(motor["brake"]["stop_J"].get<double>(), energy, 1e-9);
+  // The check counts it, and fails just below.
+  Hang(fmt::format("brake: {{torque: {:.17g}}}", 1.2 * kHold * (1 + 1e-9)));
+  EXPECT_EQ(mbverify(run + " --set checks.motor_margin=1.2").exit_code, 0);
+  Hang(fmt::format("brake: {{torque: {:.17g}}}", 1.2 * kHold * (1 - 1e-9)));
+  const ProgramResult small = mbverify(run + " --set checks.motor_margin=1.2");
+  EXPECT_EQ(small.exit_code, 1) << small.out;
+}
+
+TEST_F(SizeBrake, WhatTheLinkBurnsIsReportedAndJudged) {
+  Hang("peak: 9", "dc_link: {mean_power: 1e-3, brake_voltage: 60, resistance: 9}\n");
+  const ProgramResult sized =
+      mbverify("size " + File("fast.yaml") + " --json " + File("size.json"));
+  EXPECT_EQ(sized.exit_code, 1) << sized.out << sized.err;
+  EXPECT_NE(sized.out.find("DC link: fed back"), std::string::npos) << sized.out;
+  const auto link = nlohmann::json::parse(ReadAll(File("size.json")))["dc_link"];
+  EXPECT_EQ(link["limited_by"], "brake resistor, mean");
+  // Lowered twice by 0.2 m, from rest to rest; the trapezoidal rule over 50 samples loses 3e-4.
+  EXPECT_NEAR(link["fed_back_J"]["value"].get<double>(), 2 * 3 * 9.81 * 0.2, 5e-3);
+  const std::string run = "run " + File("fast.yaml") + Out() + " --set checks.motor_margin=";
+  const double margin = link["margin"].get<double>();
+  EXPECT_EQ(mbverify(run + fmt::format("{:.17g}", margin * (1 - 1e-6))).exit_code, 0);
+  EXPECT_EQ(mbverify(run + fmt::format("{:.17g}", margin * (1 + 1e-6))).exit_code, 1);
+}
+
+class SizeChoose : public SizeCommand {
+ protected:
+  // The slide needs kForce: with a spindle of 2π mm per turn, n = 1000.
+  SizeChoose() { Write("model.yaml", kModel + std::string("motors: {x: {lead: 0.002*pi}}\n")); }
+  ProgramResult Choose(const std::string& catalogue, const std::string& more = "") const {
+    Write("catalogue.yaml", catalogue);
+    return mbverify("size " + File("slow.yaml") + " " + File("fast.yaml") + " --choose " +
+                    File("catalogue.yaml") + " --json " + File("size.json") + more);
+  }
+  [[nodiscard]] nlohmann::json Chosen() const {
+    return nlohmann::json::parse(ReadAll(File("size.json")))["choice"];
+  }
+};
+
+// Light enough alone, but its rotor needs more than the cart: 1e-3 kg m² at n v̇ = 1000 · 3.9 rad/s²
+// asks for 3.9 N m where the cart asks for 7.9e-3 N m.
+TEST_F(SizeChoose, TheChosenRotorLoadsItself) {
+  const std::string catalogue =
+      "catalogue: two\nmotors:\n"
+      "  light: {peak: 1, rotor_inertia: 1e-3, mass: 1, cost: 9}\n"
+      "  heavy: {peak: 1, rotor_inertia_kg_cm2: 0.01, mass: 2, cost: 1}\n";
+  const ProgramResult result = Choose(catalogue, " --out " + File("out"));
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_NE(result.out.find("x: heavy with gearbox none, mass 2"), std::string::npos) << result.out;
+  const auto drive = Chosen()["drives"][0];
+  EXPECT_EQ(drive["motor"], "heavy");
+  const double acceleration = 0.1 * std::pow(2 * std::numbers::pi, 2);
+  const auto light = drive["candidates"][0];
+  EXPECT_EQ(light["limited_by"], "peak");
+  EXPECT_EQ(light["scenario"], "fast");
+  EXPECT_NEAR(1.0 / light["margin"].get<double>(), kForce / 1000 + 1e-3 * 1000 * acceleration,
+              1e-9);
+  EXPECT_FALSE(light["keeps"]);
+  const std::string csv = ReadAll(File("out") + "/cart/size/size.csv");
+  EXPECT_NE(csv.find("x,light,none,1,9,"), std::string::npos) << csv;
+  EXPECT_NE(ReadAll(File("out") + "/cart/size/size.html").find("Choice from the catalogue"),
+            std::string::npos);
+  // Cheapest instead of lightest: the first one keeps the margin.
+  EXPECT_EQ(Choose(catalogue, " --by cost").exit_code, 0);
+  EXPECT_EQ(Chosen()["drives"][0]["candidates"][0]["chosen"], true);
+}
+
+// What is printed is a model's section: with it the model has the margin that was promised.
+TEST_F(SizeChoose, TheTextOfTheChoiceIsAModel) {
+  ASSERT_EQ(
+      Choose("catalogue: one\nmotors: {A: {continuous: 0.1, peak: 1, rotor_inertia: 1e-6, "
+             "torque_constant: 0.1, resistance: 2, mass: 1, gearboxes: [G], thermal: "
+             "{winding_to_housing: 1, "
+             "housing_to_ambient: 2, winding_time: 9, housing_time: 99, max_winding_C: 99}}}\n"
+             "gearboxes: {G: {ratio: 2, efficiency: 0.9, inertia: 1e-7, mass: 1, "
+             "peak_torque: 3, exponent: 10/3, mean_torque: 0.01}}\n")
+          .exit_code,
+      0);
+  const auto choice = Chosen();
+  for (const auto& candidate : choice["drives"][0]["candidates"]) {
+    if (!candidate["chosen"]) continue;
+    Write("model.yaml", kModel + choice["model_text"].get<std::string>());
+    (void)mbverify("size " + File("slow.yaml") + " " + File("fast.yaml") + " --json " +
+                   File("again.json"));
+    const auto again = nlohmann::json::parse(ReadAll(File("again.json")))["motors"][0];
+    EXPECT_NEAR(again["margin"].get<double>(), candidate["margin"].get<double>(), 1e-9);
+    EXPECT_EQ(again["limited_by"], candidate["limited_by"]);
+    return;
+  }
+  FAIL() << choice.dump(2);
+}
+
+// Just above and just below the margin.
+TEST_F(SizeChoose, TheMarginDecides) {
+  const auto catalogue = [](double peak) {
+    return fmt::format("catalogue: one\nmotors: {{A: {{peak: {:.17g}, mass: 1}}}}\n", peak);
+  };
+  const double needed = kForce / 1000;
+  EXPECT_EQ(Choose(catalogue(1.5 * needed * (1 + 1e-9)), " --margin 1.5").exit_code, 0);
+  const ProgramResult small = Choose(catalogue(1.5 * needed * (1 - 1e-9)), " --margin 1.5");
+  EXPECT_EQ(small.exit_code, 1);
+  EXPECT_NE(small.out.find("x: nothing in 'one' has the margin 1.5"), std::string::npos)
+      << small.out;
+  EXPECT_EQ(Chosen()["drives"][0]["motor"], "");
+}
+
+TEST_F(SizeChoose, BadCataloguesAndModelsWithoutMotorsAreRefused) {
+  const ProgramResult none = Choose("catalogue: one\nmotors: {A: {peak: 1, cost: 3}}\n");
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_NE(none.err.find("motors.A has no mass"), std::string::npos) << none.err;
+  EXPECT_EQ(Choose("catalogue: one\nmotors: {A: {peak: x}}\n").exit_code, 2);
+  EXPECT_EQ(Choose("catalogue: one\nmotors: {A: {mass: 1, gearboxes: [none], kind: linear, "
+                   "peak: 1}}\n")
+                .exit_code,
+            1);
+  EXPECT_EQ(Chosen()["drives"][0]["candidates"][0]["limited_by"], "it slides, the model's turns");
+  Write("catalogue.yaml", "catalogue: one\nmotors: {A: {mass: 1, peak: 1}}\n");
+  EXPECT_EQ(mbverify("check " + File("catalogue.yaml")).exit_code, 0);
+  const ProgramResult bare =
+      mbverify("size " + File("none.yaml") + " --choose " + File("catalogue.yaml"));
+  EXPECT_EQ(bare.exit_code, 2);
+  EXPECT_NE(bare.err.find("motors: {DRIVE: {}}"), std::string::npos) << bare.err;
 }
 
 }  // namespace
