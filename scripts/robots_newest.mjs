@@ -32,6 +32,7 @@ const AT_REST = 1e-9;                         // rates without dry friction [rad
 
 const sum = (list) => list.reduce((a, b) => a + b, 0);
 const norm = (list) => Math.sqrt(sum(list.map((x) => x * x)));
+const dot = (a, b) => sum(a.map((x, i) => x * b[i]));
 const minus = (a, b) => a.map((x, i) => x - b[i]);
 
 /** Rows of the rotation of a unit quaternion (w, x, y, z). */
@@ -68,6 +69,9 @@ function ofAngles([roll, pitch, yaw]) {
   return times(times(about(2, yaw), about(1, pitch)), about(0, roll));
 }
 
+const times3 = (R, x) => R.map((row) => dot(row, x));
+const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b * d];
+
 // As model files write it.
 const asWritten = (name) => name.replace(/[^A-Za-z0-9_.-]/g, '_');
 
@@ -96,6 +100,7 @@ export class Robot {
     const known = new Set([...mechanism.joints, ...mechanism.couplings].map((one) => one.name));
     this.loose = [...Array(model.neq).keys()].filter((id) => !known.has(this.equalityName(id)));
     this.held = this.heldDofs();
+    this.spins = this.heldSpins();
     this.drives = mechanism.drives.map((drive) => this.place(drive));
   }
 
@@ -109,15 +114,26 @@ export class Robot {
     return `equality_${id}`;
   }
 
-  // Of free joints whose bodies are held there.
+  // Of joints of a base that are left out: its body is held where they have it.
   heldDofs() {
-    const {mj, model, mechanism} = this, dofs = [];
+    const {mj, model, mechanism} = this, type = mj.mjtJoint, dofs = [];
+    const sizes = {[type.mjJNT_FREE.value]: 6, [type.mjJNT_BALL.value]: 3};
     for (const [name, id] of Object.entries(this.joints)) {
-      const joint = mechanism.joints.find((one) => one.name === name);
-      if (model.jnt_type[id] !== mj.mjtJoint.mjJNT_FREE.value || joint?.kind === 'free') continue;
-      for (let i = 0; i < 6; i++) dofs.push(model.jnt_dofadr[id] + i);
+      const kind = mechanism.joints.find((one) => one.name === name)?.kind ?? 'fixed';
+      if (kind !== 'fixed') continue;
+      for (let i = 0; i < (sizes[model.jnt_type[id]] ?? 1); i++) dofs.push(model.jnt_dofadr[id] + i);
     }
     return dofs;
+  }
+
+  // Balls and connects of rods that are universal joints there: f·m = 0 of an axis f of the one and m
+  // of the other body holds the spin of the rod about its own line.
+  heldSpins() {
+    const {mj, model, mechanism} = this;
+    const isBall = (name) => model.jnt_type[this.joints[name]] === mj.mjtJoint.mjJNT_BALL.value;
+    return mechanism.joints.filter(({name, kind, closure}) => kind === 'universal' && (closure || isBall(name))).map(({parent, child, axis, axis2}) => ({
+      parent: this.bodies[parent.body], f: times3(parent.R, axis), child: this.bodies[child.body], m: times3(child.R, axis2),
+    }));
   }
 
   place(drive) {
@@ -169,6 +185,8 @@ export class Robot {
     const qpos = Array.from(model.qpos0);
     for (const [name, id] of Object.entries(this.joints)) {
       const joint = mechanism.joints.find((one) => one.name === name), at = model.jnt_qposadr[id];
+      const isFree = model.jnt_type[id] === type.mjJNT_FREE.value;
+      if (!isFree && (joint?.kind ?? 'fixed') === 'fixed') continue;  // held
       const body = this.nameOf(model.jnt_bodyid[id]);
       switch (model.jnt_type[id]) {
         case type.mjJNT_FREE.value: {
@@ -177,7 +195,7 @@ export class Robot {
           break;
         }
         case type.mjJNT_BALL.value:
-          qpos.splice(at, 4, ...times(qpos.slice(at, at + 4), ofAngles(joint.home)));
+          qpos.splice(at, 4, ...(joint.kind === 'ball' ? times(qpos.slice(at, at + 4), ofAngles(joint.home)) : this.homeTurn(model.jnt_bodyid[id])));
           break;
         default:
           qpos[at] += joint.home[0];
@@ -185,6 +203,14 @@ export class Robot {
     }
     data.qpos.set(qpos);
     for (const id of this.loose) data.eq_active[id] = 0;
+  }
+
+  // The rotation of a body's ball in the home pose.
+  homeTurn(body) {
+    const {model} = this, home = (id) => this.mechanism.bodies.find((one) => one.name === this.nameOf(id)).home.R;
+    const columns = (R) => [0, 1, 2].map((k) => R.map((row) => row[k])), product = (A, B) => A.map((row) => times3(columns(B), row));
+    const before = product(home(model.body_parentid[body]), rotation(model.body_quat.slice(4 * body, 4 * body + 4)));
+    return quaternion(product(columns(before), home(body)));
   }
 
   nameOf(body) { return Object.keys(this.bodies).find((name) => this.bodies[name] === body); }
@@ -205,18 +231,49 @@ export class Robot {
     return worst;
   }
 
+  // The axes of a held spin in the world.
+  axes({parent, f, child, m}) {
+    const turn = (body, x) => times3([0, 3, 6].map((k) => Array.from(this.data.xmat.slice(9 * body + k, 9 * body + k + 3))), x);
+    return [turn(parent, f), turn(child, m)];
+  }
+
+  // Of a body's angular velocity, three rows.
+  turning(body) {
+    const {mj, model, data} = this, buffer = new mj.DoubleBuffer(3 * model.nv);
+    mj.mj_jacBody(model, data, null, buffer, body);
+    const J = Array.from(buffer.GetView());
+    buffer.delete();
+    return [0, 1, 2].map((k) => J.slice(k * model.nv, (k + 1) * model.nv));
+  }
+
   // Equality rows at the present position, then those that are held and driven.
   rows() {
     const {mj, model, data} = this, nv = model.nv;
     model.opt.disableflags = this.flags | this.constrained;
     mj.mj_fwdPosition(model, data);
     const unit = (dof) => Float64Array.from({length: nv}, (_, i) => (i === dof ? 1 : 0));
-    const J = data.efc_J;
+    const J = data.efc_J, spins = this.spins.map((spin) => {
+      const [f, m] = this.axes(spin), n = cross(m, f), child = this.turning(spin.child), parent = this.turning(spin.parent);
+      return {pos: dot(f, m), J: Float64Array.from({length: nv}, (_, i) => sum(n.map((x, k) => x * (child[k][i] - parent[k][i]))))};
+    });
     return {
-      pos: Array.from(data.efc_pos.slice(0, data.ne)),
+      pos: [...Array.from(data.efc_pos.slice(0, data.ne)), ...this.held.map(() => 0), ...spins.map((row) => row.pos)],
       J: [...Array.from({length: data.ne}, (_, r) => J.slice(r * nv, (r + 1) * nv)),
-          ...this.held.map(unit), ...this.drives.map((drive) => unit(drive.dof))],
+          ...this.held.map(unit), ...spins.map((row) => row.J), ...this.drives.map((drive) => unit(drive.dof))],
     };
+  }
+
+  // J̇q̇ of rows() but the drives', after mj_forward.
+  bias() {
+    const {mj, model, data} = this, three = (list, body) => Array.from(list.slice(6 * body, 6 * body + 3));
+    const ofLoops = equalityBias(data);
+    data.qacc.fill(0);
+    mj.mj_rnePostConstraint(model, data);
+    return [...ofLoops, ...this.held.map(() => 0), ...this.spins.map((spin) => {
+      const [f, m] = this.axes(spin), {parent, child} = spin, w = [three(data.cvel, parent), three(data.cvel, child)];
+      const turned = minus(cross(cross(w[1], m), f), cross(cross(w[0], f), m));
+      return dot(minus(three(data.cacc, child), three(data.cacc, parent)), cross(m, f)) + dot(minus(w[1], w[0]), turned);
+    })];
   }
 
   // (1): positions, by Newton's method from where it is.
@@ -225,7 +282,7 @@ export class Robot {
     for (let i = 0; i < 40; i++) {
       const {pos, J} = this.rows();
       const apart = this.drives.map((drive, k) => data.qpos[drive.at] - model.qpos0[drive.at] - x[k]);
-      const gap = [...pos, ...this.held.map(() => 0), ...apart];
+      const gap = [...pos, ...apart];
       const largest = Math.max(0, ...gap.map(Math.abs));
       if (largest < 1e-14) return 0;
       if (i === 39) return largest;
@@ -240,12 +297,11 @@ export class Robot {
 
   /** (1), (2): drive forces for drives' positions, rates and accelerations, and the gap left. */
   driveForces(x, rate, acceleration) {
-    const {mj, model, data} = this, none = this.held.map(() => 0);
-    const gap = this.close(x), {J} = this.rows(), ne = data.ne;
-    data.qvel.set(leastSolution(J, [...Array(ne).fill(0), ...none, ...rate]));
+    const {mj, model, data} = this;
+    const gap = this.close(x), {J} = this.rows();
+    data.qvel.set(leastSolution(J, [...Array(J.length - rate.length).fill(0), ...rate]));
     mj.mj_forward(model, data);
-    const bias = equalityBias(data);
-    const qacc = leastSolution(J, [...bias.map((value) => -value), ...none, ...acceleration]);
+    const qacc = leastSolution(J, [...this.bias().map((value) => -value), ...acceleration]);
     model.opt.disableflags = this.flags | this.unconstrained;
     data.qacc.set(qacc);
     mj.mj_inverse(model, data);

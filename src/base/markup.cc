@@ -272,8 +272,10 @@ std::string TexText(std::string_view given_text) {
 namespace {
 
 constexpr int kMeasured = 4;  // digits from which on a number is not taken for exact
+constexpr int kNothing = 9;   // decimals that are zero before a number that is round-off of zero
 
-// Decimals of a number that was not written as a round one; empty for others and for words.
+// Decimals of a number that was not written as a round one; empty for others, for words and for
+// what computing left of a zero (-1.30697e-17).
 std::optional<int> DecimalsOf(std::string_view number) {
   const size_t e = number.find_first_of("eE");
   int exponent = 0, decimals = 0, significant = 0;
@@ -293,7 +295,7 @@ std::optional<int> DecimalsOf(std::string_view number) {
       return std::nullopt;
     }
   }
-  if (significant < kMeasured) return std::nullopt;
+  if (significant < kMeasured || decimals - exponent - significant >= kNothing) return std::nullopt;
   return decimals - exponent;
 }
 

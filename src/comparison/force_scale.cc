@@ -350,7 +350,10 @@ class Scales {
 
 double ForceScale::Floor(const std::string& unit) const {
   const auto found = of_unit.find(unit);
-  return found == of_unit.end() ? 0.0 : kIdle * found->second;
+  if (found == of_unit.end()) return 0.0;
+  // Where nothing acts along any of them, round-off of the forces across them is left.
+  const double across = unit == "N" ? force_N : moment_Nm;
+  return kIdle * (found->second > kEps * across ? found->second : across);
 }
 
 DrivenTwists TwistsFor(const ComparisonInput& input) {

@@ -15,8 +15,9 @@ namespace mbv::internal {
 
 /// A singular value below this times the largest counts as zero. Home poses close to 1e-12.
 inline constexpr double kRankTolerance = 1e-9;
-/// A self-stress with a smaller share than this in a row does not act there.
-inline constexpr double kStressTolerance = 1e-7;
+/// A self-stress with a smaller share than this in a row does not act there. An order below what
+/// reactions that statics determines may differ by.
+inline constexpr double kStressTolerance = 1e-8;
 
 using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 

@@ -291,6 +291,19 @@ MatX SparseRank::NullSpace() const {
   return N;
 }
 
+VecX SparseRank::SolveNormal(const VecX& b) const {
+  VecX kept(static_cast<Eigen::Index>(kept_.size()));
+  const auto column = [this](Eigen::Index k) {
+    return order_[static_cast<size_t>(kept_[static_cast<size_t>(k)])];
+  };
+  for (Eigen::Index k = 0; k < kept.size(); ++k) kept[k] = b[column(k)];
+  R_kept_.transpose().triangularView<Eigen::Lower>().solveInPlace(kept);
+  R_kept_.triangularView<Eigen::Upper>().solveInPlace(kept);
+  VecX x = VecX::Zero(b.size());
+  for (Eigen::Index k = 0; k < kept.size(); ++k) x[column(k)] = kept[k];
+  return x;
+}
+
 namespace {
 
 // Weight of the norm: about the smallest singular value of A, for which the condition of the whole

@@ -66,6 +66,8 @@ class SparseRank {
   /// Columns × (columns − rank), A N = 0: of each dropped column what balances it among those kept;
   /// columns of unit length.
   [[nodiscard]] MatX NullSpace() const;
+  /// x with AᵀA x = b and zeros at the columns dropped, for b that is a combination of A's rows.
+  [[nodiscard]] VecX SolveNormal(const VecX& b) const;
 
  private:
   using Row = std::vector<std::pair<int, double>>;  ///< (place of the column in the order, entry)

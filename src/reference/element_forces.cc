@@ -275,22 +275,31 @@ double LoadFrictionLoss(const Mechanism& mechanism, const ReferenceSample& sampl
   return loss;
 }
 
-void AddRotorMomenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R,
-                     MatX* MR) {
-  if (mechanism.elements.empty()) return;
-  const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
-  for (size_t e = 0; e < rows.size(); ++e) {
+void ForRotorInertias(const Mechanism& mechanism, const BodyStates& states, const AddInertia& add) {
+  struct Part {
+    size_t body;
+    Vec6 u, a;
+  };
+  std::vector<Part> parts;
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     const auto* rotor = std::get_if<RotorLaw>(&mechanism.elements[e].law);
     if (rotor == nullptr) continue;
-    const VecX u = GradientOf(rows[e], mechanism.bodies.size());
-    *MR += rotor->reflected() * u * (u.transpose() * R);
-    if (!rotor->carrier || rotor->carrier->body == 0) continue;
-    // The mixed term J n q̇ a·ω.
-    const auto carrier = static_cast<size_t>(rotor->carrier->body);
-    VecX a = VecX::Zero(R.rows());
-    a.segment<3>(6 * (rotor->carrier->body - 1)) =
-        states.X_WB[carrier].linear() * rotor->carrier->axis_B;
-    *MR += rotor->inertia * rotor->ratio * (u * (a.transpose() * R) + a * (u.transpose() * R));
+    const ScalarRow row = ElementRow(mechanism, e, states);
+    parts = {{static_cast<size_t>(row.parent), row.J_parent, Vec6::Zero()},
+             {static_cast<size_t>(row.child), row.J_child, Vec6::Zero()}};
+    if (rotor->carrier) {
+      Part& carrier = parts.emplace_back(
+          Part{static_cast<size_t>(rotor->carrier->body), Vec6::Zero(), Vec6::Zero()});
+      carrier.a.head<3>() = states.X_WB[carrier.body].linear() * rotor->carrier->axis_B;
+    }
+    std::erase_if(parts, [](const Part& part) { return part.body == 0; });
+    for (const Part& x : parts) {
+      for (const Part& y : parts) {
+        add(x.body, y.body,
+            rotor->reflected() * x.u * y.u.transpose() +
+                rotor->inertia * rotor->ratio * (x.u * y.a.transpose() + x.a * y.u.transpose()));
+      }
+    }
   }
 }
 

@@ -15,6 +15,7 @@
 // joint's load adds to (4), load_friction.h finds.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "base/run_summary.h"
@@ -51,9 +52,10 @@ void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, En
 void AddElementPowers(const Mechanism& mechanism, const BodyStates& states,
                       const std::vector<int>& friction_signs, Powers* power);
 
-/// Adds what motions R (6·bodies × n) call for of rotors: Σ J n² u (uᵀR), u: gradient of the
-/// coordinate; with a carrier also J n (u aᵀ + a uᵀ) R.
-void AddRotorMomenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R, MatX* MR);
+/// Inertia of the rotors: Σ J n² u uᵀ, u: gradient of the coordinate; with a carrier also
+/// J n (u aᵀ + a uᵀ). In blocks of moving bodies, in an order that the mechanism gives.
+using AddInertia = std::function<void(size_t row_body, size_t column_body, const Mat6& block)>;
+void ForRotorInertias(const Mechanism& mechanism, const BodyStates& states, const AddInertia& add);
 
 /// An element's slope of force over position and over rate, along `u` the gradient of its
 /// coordinate: what vibrates or creeps.

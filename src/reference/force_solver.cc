@@ -47,14 +47,16 @@ void LeastForces::Take(const MatX& self_stress, Eigen::Index first_driven, VecX*
   force->noalias() -= rest_ * rest_share_;
 }
 
-bool SelfStressReaches(const SparseLeastNorm& forces, const SparseLu::Matrix& A,
-                       Eigen::Index first) {
+VecX RandomSelfStress(const SparseLeastNorm& forces, const SparseLu::Matrix& A) {
   VecX random(A.cols());
   for (Eigen::Index i = 0; i < random.size(); ++i) {
     random[i] = std::sin(1.0 + 1.7 * static_cast<double>(i) + std::cos(static_cast<double>(i)));
   }
-  const VecX stress = random - forces.LeastNorm(A * random);
-  return stress.tail(random.size() - first).norm() > kShare * stress.norm();
+  return random - forces.LeastNorm(A * random);
+}
+
+bool SelfStressReaches(const VecX& random_stress, Eigen::Index first) {
+  return random_stress.tail(random_stress.size() - first).norm() > kShare * random_stress.norm();
 }
 
 namespace {
@@ -177,7 +179,8 @@ bool ForceSolver::FactorSparse() {
   } else {
     system_.FillColumns(rows_, all, &columns_);
   }
-  return least_.Factor(columns_, 0.0) && !SelfStressReaches(least_, columns_, first_driven_);
+  return least_.Factor(columns_, 0.0) &&
+         !SelfStressReaches(RandomSelfStress(least_, columns_), first_driven_);
 }
 
 // Each force outside the basis with the basis forces that balance it.
@@ -546,7 +549,11 @@ MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R
     const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
     MR.middleRows<6>(at) = M * R.middleRows<6>(at);
   }
-  AddRotorMomenta(mechanism, states, R, &MR);
+  ForRotorInertias(mechanism, states, [&](size_t b, size_t c, const Mat6& block) {
+    const auto row = 6 * (static_cast<Eigen::Index>(b) - 1);
+    const auto column = 6 * (static_cast<Eigen::Index>(c) - 1);
+    MR.middleRows<6>(row) += block * R.middleRows<6>(column);
+  });
   return MR;
 }
 

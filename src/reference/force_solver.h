@@ -37,10 +37,11 @@ class LeastForces {
   VecX householder_, along_, share_, rest_share_;
 };
 
-/// Whether a self-stress acts on forces from `first` on, where `forces` solves A x = b for forces
-/// x: a random self-stress has a share in all that one acts on.
-[[nodiscard]] bool SelfStressReaches(const SparseLeastNorm& forces, const SparseLu::Matrix& A,
-                                     Eigen::Index first);
+/// A random self-stress, A · stress = 0, where `forces` solves A x = b for forces x: it has a share
+/// in all forces that one acts on, and is round-off where there is none.
+[[nodiscard]] VecX RandomSelfStress(const SparseLeastNorm& forces, const SparseLu::Matrix& A);
+/// Whether self-stresses act on forces from `first` on.
+[[nodiscard]] bool SelfStressReaches(const VecX& random_stress, Eigen::Index first);
 
 class ForceSolver {
  public:

@@ -53,9 +53,6 @@ namespace {
 
 // A row with a smaller pivot (relative) is lost: accelerations divide by it.
 constexpr double kLost = 1e-9;
-// Corrections of the pose use rows with larger pivots only; what a weaker row misses is second
-// order there, and dividing round-off by its pivot would push the pose sideways.
-constexpr double kFirm = 1e-5;
 // A row beyond the expected rank with a larger pivot contradicts it; closed loops leave 1e-11.
 constexpr double kExtra = 1e-6;
 constexpr int kMostCorrections = 12;
@@ -74,7 +71,9 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
       dofs_(static_cast<int>(motion.initial.size())),
       spins_(IdleSpins(mechanism)),
       followed_(FollowedAngles(mechanism, motion)),
+      factors_(mechanism.bodies.size(), length_, dofs_),
       near_(mechanism, length_),
+      scales_(mechanism.bodies.size(), length_),
       loaded_(LoadedElements(mechanism)) {
   body_scale_.setOnes(size_);
   for (int i = 0; i < size_; i += 6) body_scale_.segment<3>(i).setConstant(1.0 / length_);
@@ -104,63 +103,11 @@ void FreeDynamics::FillRows(double t_s, const BodyStates& states) {
 
 void FreeDynamics::Factor(double t_s, const BodyStates& states) {
   FillRows(t_s, states);
-  MatX columns = MatX::Zero(size_, rows_.size());
-  row_scale_.resize(rows_.size());
-  for (int i = 0; i < rows_.size(); ++i) {
-    row_scale_[i] = rows_.angular[i] ? length_ : 1.0;
-    for (int p = rows_.start[i]; p < rows_.start[i + 1]; ++p) {
-      const int at = 6 * (rows_.body[p] - 1);
-      columns.col(i).segment<6>(at) =
-          row_scale_[i] * body_scale_.segment<6>(at).cwiseProduct(rows_.J[p]);
-    }
-  }
-  const Eigen::Index rank = size_ - dofs_;
-  if (rows_.size() == 0) {  // nothing to factor: every body floats
-    pivot_ = rank == 0 ? 1.0 : 0.0;
-    return;
-  }
-  qr_.compute(columns);
-  const auto pivots = qr_.matrixQR().diagonal();
-  if (rank == 0) {
-    pivot_ = 1.0;
-  } else {
-    pivot_ = rank > pivots.size() ? 0.0 : std::abs(pivots[rank - 1]) / std::abs(pivots[0]);
-  }
-}
-
-Eigen::Index FreeDynamics::FirmRank() const {
-  if (rows_.size() == 0) return 0;
-  const auto pivots = qr_.matrixQR().diagonal();
-  Eigen::Index rank = std::min<Eigen::Index>(size_ - dofs_, pivots.size());
-  while (rank > 0 && std::abs(pivots[rank - 1]) < kFirm * std::abs(pivots[0])) --rank;
-  return rank;
-}
-
-VecX FreeDynamics::LeastMotion(const VecX& rates, Eigen::Index rank) const {
-  if (rank == 0) return VecX::Zero(size_);
-  // Jᵀ P = Q R, so the chosen rows give R₁ᵀ (Q₁ᵀ V) = (P ᵀrates)₁.
-  const VecX ordered = qr_.colsPermutation().transpose() * rates.cwiseProduct(row_scale_);
-  const auto R = qr_.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
-  VecX motion = VecX::Zero(size_);
-  motion.head(rank) = R.transpose().solve(ordered.head(rank));
-  motion.applyOnTheLeft(qr_.householderQ());
-  return body_scale_.cwiseProduct(motion);
-}
-
-MatX FreeDynamics::Motions() const {
-  MatX motions = MatX::Zero(size_, dofs_);
-  motions.bottomRows(dofs_).setIdentity();
-  if (rows_.size() > 0) motions.applyOnTheLeft(qr_.householderQ());
-  return body_scale_.asDiagonal() * motions;
+  factors_.Factor(rows_);
 }
 
 std::string FreeDynamics::SoftJoint(const BodyStates& states) const {
-  const Eigen::Index weakest = size_ - dofs_ - 1;
-  if (weakest < 0) return "";
-  // The part of the weakest row that no stronger one holds.
-  VecX motion = VecX::Unit(size_, weakest);
-  if (rows_.size() > 0) motion.applyOnTheLeft(qr_.householderQ());
-  return MostMovingJoint(mechanism_, states, body_scale_.cwiseProduct(motion));
+  return size_ == dofs_ ? "" : MostMovingJoint(mechanism_, states, factors_.WeakestMotion());
 }
 
 RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
@@ -169,28 +116,23 @@ RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
   summary.time_s = t_s;
   summary.where = SoftJoint(states);
   summary.names_where = true;
-  summary.amount = pivot_;
+  summary.amount = pivot();
   summary.unit = std::string("1");
   summary.message = fmt::format(
       "the loops lose a constraint at this pose: in addition to the {} degree{} of freedom of the "
       "mechanism, {} is uncontrolled there, so the way on is not determined (relative pivot "
       "{:.1e})",
       dofs_ + static_cast<int>(motion_.commands.size()),
-      dofs_ + motion_.commands.size() == 1 ? "" : "s", summary.where, pivot_);
+      dofs_ + motion_.commands.size() == 1 ? "" : "s", summary.where, pivot());
   return summary;
 }
 
 RunSummary FreeDynamics::CheckDofs(double t_s) const {
-  if (rows_.size() == 0) return RunSummary::Done();
-  const auto pivots = qr_.matrixQR().diagonal();
-  const Eigen::Index rank = size_ - dofs_;
-  if (rank >= pivots.size() || !(std::abs(pivots[rank]) > kExtra * std::abs(pivots[0]))) {
-    return RunSummary::Done();
-  }
+  if (!(factors_.extra() > kExtra)) return RunSummary::Done();
   RunSummary summary;
   summary.stop = Stop::kUnsupported;
   summary.time_s = t_s;
-  summary.amount = std::abs(pivots[rank]) / std::abs(pivots[0]);
+  summary.amount = factors_.extra();
   summary.unit = std::string("1");
   summary.message = fmt::format(
       "the loops and commands leave fewer than the {} degrees of freedom that have initial values: "
@@ -215,11 +157,11 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   FollowAngles(mechanism_, followed_, states);
   Factor(t_s, *states);
   states->engaged = command_.engaged;
-  if (!(pivot_ > kLost)) return Singular(t_s, *states);
+  if (!(pivot() > kLost)) return Singular(t_s, *states);
   if (RunSummary summary = CheckDofs(t_s); !summary.ok()) return summary;
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
   rates.tail(command_.acceleration.size()) += command_.acceleration;
-  const VecX A_p = LeastMotion(rates, size_ - dofs_);
+  const VecX A_p = factors_.LeastMotion(rates, false);
   Unstack(A_p, &states->A_WB);
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
@@ -260,15 +202,10 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   return RunSummary::Done();
 }
 
-// The rows that the last factorisation picked.
 void FreeDynamics::ChooseNear() {
-  if (near_.chosen() || !near_.apply()) return;
-  const Eigen::Index rank = size_ - dofs_;
-  if (rank > 0 && (rows_.size() == 0 || rank > qr_.cols())) return;
-  std::vector<int> rows;
-  for (Eigen::Index k = 0; k < rank; ++k) rows.push_back(qr_.colsPermutation().indices()[k]);
-  std::ranges::sort(rows);
-  near_.Choose(std::move(rows));
+  if (near_.chosen()) return;
+  std::vector<int> rows = factors_.IndependentRows(rows_);
+  if (static_cast<int>(rows.size()) == size_ - dofs_) near_.Choose(std::move(rows));
 }
 
 RunSummary FreeDynamics::AccelerateNear(double t_s, BodyStates* states) {
@@ -345,13 +282,6 @@ void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const Mat
   }
 }
 
-double FreeDynamics::ShareLeft(const ScalarRow& row) const {
-  VecX turned = body_scale_.cwiseProduct(GradientOf(row, mechanism_.bodies.size()));
-  const double size = turned.norm();
-  if (rows_.size() > 0) turned.applyOnTheLeft(qr_.householderQ().adjoint());
-  return turned.tail(dofs_).norm() / size;
-}
-
 RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) {
   if (moved != nullptr) *moved = 0.0;
   double open = kNan, previous = std::numeric_limits<double>::infinity();
@@ -374,7 +304,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
       VecX rates = VecX::Zero(rows_.size());
       rates.tail(command_.velocity.size()) = command_.velocity;
       rates -= rows_.Rates(states->V_WB);
-      VecX V = Stack(states->V_WB) + LeastMotion(rates, FirmRank());
+      VecX V = Stack(states->V_WB) + factors_.LeastMotion(rates, true);
       V -= MotionOfHeld(held.gradients, held.gradients * V);
       Unstack(V, &states->V_WB);
       FollowDriven(mechanism_, states);
@@ -382,7 +312,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
       return RunSummary::Done();
     }
     previous = open;
-    VecX step = LeastMotion(-r, FirmRank());
+    VecX step = factors_.LeastMotion(-r, true);
     step -= MotionOfHeld(held.gradients, held.gradients * step + held.gaps);
     if (moved != nullptr) *moved += SizeOf(step, length_);
     MoveBodies(step, states);

@@ -1,8 +1,8 @@
 // Accelerations of a mechanism whose motion follows from forces. Internal to reference/.
 //
-// With the scaled Jacobian J of all joint rows and commands, a QR factorisation of Jᵀ with column
-// pivoting at the present pose picks k = n − f independent rows (n: body coordinates, f: DOFs
-// that move by forces) and gives an orthonormal basis R of the motions they leave:
+// With the scaled Jacobian J of all joint rows and commands, of rank n − f (n: body coordinates, f:
+// DOFs that move by forces), orthogonal factors at the present pose (row_factors.h) give an
+// orthonormal basis R of the motions they leave:
 //   J R = 0                                                                                    (1)
 //   A = A_p + R u̇,  A_p = J⁺(ẍ − b)  (least norm)                                             (2)
 //   RᵀM R u̇ = Rᵀ(F − w(A_p))                                                                  (3)
@@ -36,6 +36,7 @@
 #include "reference/motion_equations.h"
 #include "reference/reference.h"
 #include "reference/rest_decision.h"
+#include "reference/row_factors.h"
 #include "reference/row_set.h"
 
 // Polynomials through values and derivatives. Internal to reference/.
@@ -85,7 +86,9 @@ class FreeDynamics {
   /// The held elements at the last Accelerate().
   [[nodiscard]] const RestSystem& rest() const { return rest_; }
   /// Share of its coordinate's motion that loops and commands leave to forces, after Accelerate().
-  [[nodiscard]] double ShareLeft(const ScalarRow& row) const;
+  [[nodiscard]] double ShareLeft(const ScalarRow& row) const {
+    return factors_.ShareLeft(GradientOf(row, mechanism_.bodies.size()));
+  }
 
   /// Poses onto the loops and commands at t by Newton with the least correction, then velocities;
   /// `moved` (if given) is the size of the correction of the pose [rad, characteristic lengths].
@@ -101,9 +104,8 @@ class FreeDynamics {
     return static_cast<Eigen::Index>(mechanism_.drives.size() + mechanism_.prescribed.size()) + 2;
   }
 
-  /// Smallest pivot kept by the last factorisation, over the largest: 0 where the loops lose a
-  /// constraint.
-  [[nodiscard]] double pivot() const { return pivot_; }
+  /// RowFactors::pivot() of the last factorisation: 0 where the loops lose a constraint.
+  [[nodiscard]] double pivot() const { return factors_.pivot(); }
   /// Name of the joint that moves most in the motion that the weakest row hardly holds.
   [[nodiscard]] std::string SoftJoint(const BodyStates& states) const;
 
@@ -116,16 +118,13 @@ class FreeDynamics {
   [[nodiscard]] double length() const { return length_; }
   [[nodiscard]] int dofs() const { return dofs_; }
   /// Basis R of the last factorisation, scaled back: 6·bodies × DOFs.
-  [[nodiscard]] MatX Motions() const;
+  [[nodiscard]] MatX Motions() const { return factors_.Motions(); }
 
  private:
   /// Largest residual [rad, characteristic lengths] of the rows last factored; NaN if one is.
   [[nodiscard]] double LargestOpen() const;
   /// What rounding leaves of them at these poses.
   [[nodiscard]] double Rounding(const BodyStates& states) const;
-  /// Least-norm twists with J V = rates, from the first `rank` pivots.
-  [[nodiscard]] VecX LeastMotion(const VecX& rates, Eigen::Index rank) const;
-  [[nodiscard]] Eigen::Index FirmRank() const;
   /// What rests, per held coordinate: gradients (held × 6·bodies), how far they are from where they
   /// are held, and their accelerations where no body accelerates.
   struct Held {
@@ -139,17 +138,25 @@ class FreeDynamics {
   /// FrictionPhase::sign, with those of what is prescribed.
   [[nodiscard]] std::vector<int> SignsAt(const BodyStates& states) const;
   /// All that bears forces that are not given: reactions, drives, prescribed joints, what is held.
+  /// Sparse, where idle spins and the coordinates of the initial values, which then exert nothing,
+  /// make them as many as the equations, and statics determines what drives; else by orthogonal
+  /// factors.
   struct ForceRows {
     RowSet rows;
     int first_driven = 0, first_prescribed = 0, first_held = 0;
     VecX scale;
-    MatX columns;  ///< scaled wrenches of unit forces
-    Eigen::CompleteOrthogonalDecomposition<MatX> factors;
-    MatX self_stress;  ///< scaled forces that balance each other
+    MatX self_stress;  ///< scaled forces that balance each other; one of them if sparse
     [[nodiscard]] VecX Solve(const VecX& scaled_wrenches) const;
+
+    SparseLu::Matrix columns;                 ///< scaled wrenches of unit forces
+    const SparseLeastNorm* sparse = nullptr;  ///< valid until the next ForceRowsAt()
+    MatX dense;                               ///< columns of `rows`
+    Eigen::CompleteOrthogonalDecomposition<MatX> factors;
+    void FactorDense();
   };
   /// `held`: with what is held.
-  [[nodiscard]] ForceRows ForceRowsAt(const BodyStates& states, bool held) const;
+  [[nodiscard]] ForceRows ForceRowsAt(const BodyStates& states, bool held);
+  [[nodiscard]] bool FactorSparse(const BodyStates& states, bool held, ForceRows* at);
   /// Motion of the DOFs by f, what is held at rest.
   [[nodiscard]] VecX MotionBy(const VecX& f);
   /// (4), (5): finds load_friction_ at states.A_WB = A_p + R u̇_0 and adds it to rest_.
@@ -190,14 +197,14 @@ class FreeDynamics {
   VecX body_scale_;
   RowSet rows_;
   int joint_rows_ = 0;
-  VecX row_scale_;
   CommandSample command_;
   std::vector<std::vector<double>> near_values_;  ///< per command, per term
-  Eigen::ColPivHouseholderQR<MatX> qr_;           ///< of the scaled Jᵀ
-  double pivot_ = kNan;
+  RowFactors factors_;
   FrictionPhase phase_;
   RestSystem rest_;
   MotionEquations near_;
+  const SquareSystem scales_;
+  SparseLeastNorm forces_;
   const std::vector<size_t> loaded_;  ///< elements with friction by load
   VecX load_friction_;                ///< per element, at the last Accelerate()
 };

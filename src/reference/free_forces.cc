@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "base/demand.h"
 #include "kinematics/constraints.h"
@@ -16,6 +18,8 @@ namespace {
 
 // Columns that depend on others to this share do.
 constexpr double kDependentForces = 1e-9;
+// Sparse solutions miss no more of the wrenches than this share.
+constexpr double kBalanced = 1e-9;
 // A smaller share of a self-stress that a load takes is round-off.
 constexpr double kBears = 1e-9;
 // Passes that find the loads of what rests, and the change below which round-off may end them.
@@ -26,14 +30,34 @@ constexpr double kStalledLoads = 1e-12;
 
 // The forces with columns · force = wrenches as well as can be; LeastForces of them.
 VecX FreeDynamics::ForceRows::Solve(const VecX& scaled_wrenches) const {
-  if (columns.cols() == 0) return VecX();
+  if (rows.size() == 0) return VecX();
+  if (sparse != nullptr) {
+    const VecX all = sparse->LeastNorm(scaled_wrenches), force = all.head(rows.size());
+    const VecX missed = scaled_wrenches - columns.leftCols(rows.size()) * force;
+    if (missed.norm() <= kBalanced * scaled_wrenches.norm()) return force.cwiseProduct(scale);
+    ForceRows other = *this;
+    other.FactorDense();
+    return other.Solve(scaled_wrenches);
+  }
   VecX force = factors.solve(scaled_wrenches);
-  force += factors.solve(VecX(scaled_wrenches - columns * force));  // refinement
+  force += factors.solve(VecX(scaled_wrenches - dense * force));  // refinement
   if (self_stress.cols() > 0) LeastForces().Take(self_stress, first_driven, &force);
   return force.cwiseProduct(scale);
 }
 
-FreeDynamics::ForceRows FreeDynamics::ForceRowsAt(const BodyStates& states, bool held) const {
+void FreeDynamics::ForceRows::FactorDense() {
+  sparse = nullptr;
+  dense = columns.leftCols(rows.size());
+  factors.setThreshold(kDependentForces);
+  factors.compute(dense);
+  const Eigen::Index rank = factors.rank();
+  self_stress.resize(rows.size(), 0);
+  if (rank == rows.size()) return;
+  const MatX Q = OrthogonalFactor(Eigen::ColPivHouseholderQR<MatX>(dense.transpose()));
+  self_stress = Q.rightCols(rows.size() - rank);
+}
+
+FreeDynamics::ForceRows FreeDynamics::ForceRowsAt(const BodyStates& states, bool held) {
   ForceRows at;
   RowSet& rows = at.rows;
   AddReactionRows(mechanism_, states, &rows);
@@ -53,24 +77,38 @@ FreeDynamics::ForceRows FreeDynamics::ForceRowsAt(const BodyStates& states, bool
   for (const size_t e : held ? phase_.held : std::vector<size_t>{}) {
     rows.Add(elements[e], !ActsOnLength(mechanism_, mechanism_.elements[e]));
   }
-  at.columns = MatX::Zero(size_, rows.size());
   at.scale.resize(rows.size());
-  for (int i = 0; i < rows.size(); ++i) {
-    at.scale[i] = rows.angular[i] ? length_ : 1.0;
-    for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
-      const int row = 6 * (rows.body[p] - 1);
-      at.columns.col(i).segment<6>(row) =
-          at.scale[i] * body_scale_.segment<6>(row).cwiseProduct(rows.J[p]);
-    }
-  }
+  for (int i = 0; i < rows.size(); ++i) at.scale[i] = scales_.RowScale(rows.angular[i]);
   if (rows.size() == 0) return at;
-  at.factors.setThreshold(kDependentForces);
-  at.factors.compute(at.columns);
-  const Eigen::Index rank = at.factors.rank();
-  if (rank == rows.size()) return at;
-  const MatX Q = OrthogonalFactor(Eigen::ColPivHouseholderQR<MatX>(at.columns.transpose()));
-  at.self_stress = Q.rightCols(rows.size() - rank);
+  // What is held moves no more, so that other rows would complete them.
+  if (!FactorSparse(states, rows.size() > at.first_held, &at)) at.FactorDense();
   return at;
+}
+
+bool FreeDynamics::FactorSparse(const BodyStates& states, bool held, ForceRows* at) {
+  RowSet all = at->rows;
+  for (const Spin& spin : spins_) all.Add(IdleRow(spin, states), true);
+  for (const InitialValue& value : motion_.initial) {
+    all.Add(CoordinateRow(mechanism_, value.coordinate, states),
+            !IsLength(mechanism_, value.coordinate));
+  }
+  std::vector<int> columns(static_cast<size_t>(all.size()));
+  std::iota(columns.begin(), columns.end(), 0);
+  scales_.MakeColumns(all, columns, &at->columns);
+  if (held) return false;
+  if (!forces_.Factor(at->columns, 0.0)) {
+    forces_.Reset();
+    return false;
+  }
+  const VecX stress = RandomSelfStress(forces_, at->columns);
+  const double size = std::sqrt(static_cast<double>(stress.size()));
+  if (!((at->columns * stress).norm() <= kBalanced * size)) return false;
+  if (stress.norm() > kBalanced * size) {
+    if (SelfStressReaches(stress, at->first_driven)) return false;
+    at->self_stress = stress.head(at->rows.size());
+  }
+  at->sparse = &forces_;
+  return true;
 }
 
 std::vector<int> FreeDynamics::SignsAt(const BodyStates& states) const {

@@ -4,7 +4,8 @@
 //   [M  −J₁ᵀ] [A]   [F − w(0)]
 //   [J₁   0 ] [λ] = [ẍ − b   ] (1)
 // with w(0) what Newton–Euler asks of each body that does not accelerate, and J₁ independent rows
-// of loops and commands. Massless bodies are no trouble as long as what J₁ leaves has inertia.
+// of loops and commands. M is a block per body, and blocks of two bodies of rotors. Massless bodies
+// are no trouble as long as what J₁ leaves has inertia.
 #pragma once
 
 #include <vector>
@@ -12,6 +13,7 @@
 #include "math/sparse.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "reference/element_forces.h"
 #include "reference/row_set.h"
 #include "reference/square_system.h"
 
@@ -21,8 +23,6 @@ class MotionEquations {
  public:
   MotionEquations(const Mechanism& mechanism, double length);
 
-  /// Rotors add momenta of two bodies at once, which (1) leaves out.
-  [[nodiscard]] bool apply() const { return apply_; }
   /// The independent rows from now on.
   void Choose(std::vector<int> rows);
   [[nodiscard]] bool chosen() const { return chosen_; }
@@ -33,14 +33,15 @@ class MotionEquations {
                            const VecX& rates, VecX* A);
 
  private:
+  void ForInertias(const BodyStates& states, const AddInertia& add) const;
   void FillInertias(const BodyStates& states);
 
   const Mechanism& mechanism_;
-  const bool apply_;
   double mass_ = 1.0;    ///< the largest, in whose units inertias are
   SquareSystem system_;  ///< for its scales
   std::vector<int> rows_;
   bool chosen_ = false, made_ = false;
+  std::vector<int> places_;  ///< per block of ForInertias(): of its first entry in M_
   SparseSaddle::Matrix M_, columns_;
   SparseSaddle saddle_;
 };

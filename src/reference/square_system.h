@@ -39,6 +39,9 @@ class SquareSystem {
                    SparseLu::Matrix* columns) const;
   void FillColumns(const RowSet& rows, const std::vector<int>& selection,
                    SparseLu::Matrix* columns) const;
+  /// The same of the rows `among`, without entries that are zero.
+  [[nodiscard]] SparseLu::Matrix ScaledColumns(const RowSet& rows,
+                                               const std::vector<int>& among) const;
   /// Sign of the determinant of the last factorisation; comparable for the same selection.
   [[nodiscard]] int determinant_sign() const { return determinant_sign_; }
 
@@ -60,8 +63,6 @@ class SquareSystem {
   [[nodiscard]] const VecX& body_scale() const { return body_scale_; }
 
  private:
-  [[nodiscard]] SparseLu::Matrix ScaledColumns(const RowSet& rows,
-                                               const std::vector<int>& among) const;
   int size_;
   double length_;
   VecX body_scale_;  ///< 1/L for rotations, 1 for translations

@@ -1,6 +1,7 @@
 // Cost per sample and per step of chains of N four-bars: how it grows with the number of loops.
 #include <benchmark/benchmark.h>
 
+#include "reference/forward.h"
 #include "reference/reference.h"
 #include "simulation/engine/engine_model.h"
 #include "simulation/engine/simulation.h"
@@ -47,6 +48,38 @@ void Simulation(benchmark::State& state, const SimulationOptions& options) {
   state.SetComplexityN(state.range(0));
 }
 
+// Per sample, with the integration steps between and the forces there.
+void FreeReference(benchmark::State& state) {
+  const Mechanism mechanism = FourBarChain(static_cast<int>(state.range(0)));
+  const Motion motion = FreeFourBarChainMotion(mechanism);
+  for (auto _ : state) {
+    const ForwardRun run = RunForwardReference(mechanism, motion, {.measure_trust = false});
+    if (!run.summary.ok()) state.SkipWithError(run.summary.message.c_str());
+    state.SetIterationTime(run.summary.cpu_s / static_cast<double>(run.trace.time_s.size()));
+  }
+  state.SetComplexityN(state.range(0));
+}
+
+// Per step, as Simulation.
+void FreeSimulation(benchmark::State& state) {
+  const Mechanism mechanism = FourBarChain(static_cast<int>(state.range(0)));
+  const Motion motion = FreeFourBarChainMotion(mechanism);
+  SimulationOptions options;
+  if (RunSummary start = InitialStates(mechanism, motion, &options.start); !start.ok()) {
+    state.SkipWithError(start.message.c_str());
+  }
+  const auto none = [](double /*t*/, DrivenSample* at) {
+    at->position = at->velocity = at->acceleration = VecX::Zero(1);
+    return RunSummary::Done();
+  };
+  for (auto _ : state) {
+    const SimulationRun run = Simulate(mechanism, motion, none, options);
+    if (!run.summary.ok()) state.SkipWithError(run.summary.message.c_str());
+    state.SetIterationTime(run.loop_cpu_s / static_cast<double>(run.steps));
+  }
+  state.SetComplexityN(state.range(0));
+}
+
 void BareMjStep(benchmark::State& state) {
   const Mechanism mechanism = FourBarChain(static_cast<int>(state.range(0)));
   std::vector<std::string> warnings;
@@ -71,6 +104,8 @@ BENCHMARK_CAPTURE(Simulation, inverse, {.mode = DriveMode::kInverse})
     ->UseManualTime()
     ->Iterations(1);
 BENCHMARK_CAPTURE(Simulation, forward, {})->Apply(Loops)->UseManualTime()->Iterations(1);
+BENCHMARK(FreeReference)->Apply(Loops)->UseManualTime()->Iterations(1);
+BENCHMARK(FreeSimulation)->Apply(Loops)->UseManualTime()->Iterations(1);
 BENCHMARK(BareMjStep)->Apply(Loops);
 
 }  // namespace

@@ -45,6 +45,18 @@ TEST(ForceScale, ADrivenBodyDoesNotHideWhatAnotherDriveCarries) {
   EXPECT_FALSE(comparison.FindPair("simulated_vs_analytic")->drives[1].floored);
 }
 
+// Slides that lie across gravity and rest: their error is not a share of zero.
+TEST(ForceScale, RoundoffOfForcesAcrossCountsWhereNothingActsAlong) {
+  ForceScale scale;
+  scale.force_N = 10.0;
+  scale.moment_Nm = 2.0;
+  scale.of_unit = {{"N", 0.0}, {"N m", 3.0}};
+  EXPECT_DOUBLE_EQ(scale.Floor("N"), 1e-2);
+  EXPECT_DOUBLE_EQ(scale.Floor("N m"), 3e-3);
+  scale.of_unit["N"] = 1e-6;  // little acts
+  EXPECT_DOUBLE_EQ(scale.Floor("N"), 1e-9);
+}
+
 TEST(ForceScale, AFixedBodyDoesNotCount) {
   Case c;
   c.mechanism.bodies.push_back({.name = "rock", .mass = 1e12, .frames = {}, .shapes = {}});

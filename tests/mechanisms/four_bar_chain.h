@@ -64,4 +64,16 @@ inline Motion FourBarChainMotion(const Mechanism& mechanism) {
   return motion;
 }
 
+/// It is let go, turning at 1 rad/s.
+inline Motion FreeFourBarChainMotion(const Mechanism& mechanism) {
+  Motion motion;
+  motion.duration_s = 0.2;
+  motion.sample_s = 0.01;
+  const Coordinate motor{Coordinate::Kind::kDrive, 0, 0};
+  motion.initial.push_back(
+      {.name = "motor", .coordinate = motor, .position = HomeValue(mechanism, motor), .rate = 1.0});
+  motion.forces.push_back({.drive = 0, .force = Constant(0.5)});
+  return motion;
+}
+
 }  // namespace mbv

@@ -76,6 +76,24 @@ test('Inverse dynamics: forces as by hand, of redundant drives the least, rows o
   }
 });
 
+test('Dry friction is the drive\'s to overcome: against its rate, slower than Stribeck\'s more, none at rest', () => {
+  const q = 0.3, a = -1.7, torque = (0.1 + 2 * 0.25) * a - 2 * 9.81 * 0.5 * Math.cos(q);
+  const law = {coulomb: 0.4, breakaway: 0.7, stribeck_rate: 0.5};
+  const force = (v, change = {}) => {
+    const simulation = bar(['one']);
+    simulation.takeFriction([{on: {joint: 'A', coordinate: 0}, law: {...law, ...change}}]);
+    simulation.start([[q, v, a]]);
+    return inverse(simulation, [[q, v, a]])[0].force;
+  };
+  for (const v of [0.8, -0.2, 0]) {
+    const size = 0.4 + 0.3 * Math.exp(-((v / 0.5) ** 2));
+    assert.ok(Math.abs(force(v) - torque - Math.sign(v) * size) < 1e-10, `${v}`);
+  }
+  assert.ok(Math.abs(force(0.8, {stribeck_rate: 0}) - torque - 0.4) < 1e-10);
+  assert.ok(Math.abs(force(0.8, {coulomb: 0.4 * (1 + 1e-6)}) - force(0.8)) > 1e-7);
+  assert.throws(() => bar(['one']).takeFriction([{on: {joint: 'nowhere', coordinate: 0}, law}]), /no hinge or slide/);
+});
+
 test('Inverse dynamics refuses rows whose velocity term MuJoCo leaves out', () => {
   const simulation = bar(['one']);
   simulation.model.eq_data[2] = 0.5;  // of a quadratic polynomial

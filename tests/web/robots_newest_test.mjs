@@ -101,3 +101,17 @@ for (const file of ['ball_wrist.xml', 'free_platform.xml']) {
     fs.rmSync(scratch, {recursive: true});
   });
 }
+
+// A rod off whose line its mass lies, on a base of three slides and a ball: the base is held, and so
+// is the spin of the rod, as mbverify has them.
+test('Drive forces of a rod that a universal joint keeps from spinning, and not with its mass elsewhere', {skip: !process.env.MBVERIFY && 'MBVERIFY is not set'}, () => {
+  const scratch = fs.mkdtempSync(path.join(os.tmpdir(), 'robots_newest_test'));
+  const whole = fileURLToPath(new URL('robots/spun_rod.xml', import.meta.url));
+  const check = (change) => checkFile(engine, process.env.MBVERIFY, whole, scratch, change);
+  const row = check();
+  assert.ok(isWithin(row) && row.moving < 1e-11, JSON.stringify(row));
+  assert.equal(row.notes.filter((note) => /spin/.test(note)).length, 1);
+  const other = check((text) => text.replace('0.15 0.02 0.1', `0.15 ${0.02 * (1 + 1e-3)} 0.1`));
+  assert.ok(!isWithin(other) && other.moving > MOVING, JSON.stringify(other));
+  fs.rmSync(scratch, {recursive: true});
+});

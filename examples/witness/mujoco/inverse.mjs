@@ -62,8 +62,9 @@ export function inverse(simulation, motion) {
   const rates = new Array(J.length).fill(0);
   at.forEach((row, k) => { rates[row] = motion[k][1]; });
   data.qvel.set(leastSolution(J, rates));
+  simulation.applyFriction();
   mj.mj_forward(model, data);
-  // Loads (xfrc_applied) are no part of mj_inverse.
+  // Loads (xfrc_applied, qfrc_applied) are no part of mj_inverse.
   const loads = Array.from(data.qfrc_smooth, (force, i) => force - data.qfrc_passive[i] + data.qfrc_bias[i]);
   const wantedAcceleration = wanted(equalityBias(data).map((value) => -value));
   at.forEach((row, k) => { wantedAcceleration[row] = motion[k][2]; });

@@ -5,6 +5,7 @@ import {leastSolution} from './algebra.mjs';
 export const EQUALITY_DATA = 11;  // numbers of eq_data for each equality
 const CLOSED = 1e-13;      // to which loops are closed at the start, of the largest coordinate
 const STEEPEST = 0.9999;   // the stiffest impedance that MuJoCo takes
+const AT_REST = 1e-9;      // rates that are none [rad/s, m/s]
 const WALK = 40;           // steps from home to the first sample
 
 export class Simulation {
@@ -112,6 +113,26 @@ export class Simulation {
       const arm = place.map((value, k) => value + origin[3 * id + k] - centre[3 * id + k]);
       const torque = [0, 1, 2].map((k) => moment[k] + arm[(k + 1) % 3] * force[(k + 2) % 3] - arm[(k + 2) % 3] * force[(k + 1) % 3]);
       [...force, ...torque].forEach((value, k) => { data.xfrc_applied[6 * id + k] += value; });
+    }
+  }
+
+  /** Takes dry friction of hinges and slides, elements of mechanism.json. */
+  takeFriction(elements) {
+    const {mj, model} = this;
+    this.friction = elements.map(({on, law}) => {
+      const id = mj.mj_name2id(model, mj.mjtObj.mjOBJ_JOINT.value, on.joint);
+      const turns = id >= 0 && [mj.mjtJoint.mjJNT_HINGE.value, mj.mjtJoint.mjJNT_SLIDE.value].includes(model.jnt_type[id]);
+      if (!turns) throw new Refused(`dry friction acts on ${on.joint}, which is no hinge or slide of the model`);
+      return {law, dof: model.jnt_dofadr[id]};
+    });
+  }
+
+  /** Its forces at the present rates; none at rest, where it may be anything within its band. */
+  applyFriction() {
+    this.data.qfrc_applied.fill(0);
+    for (const {law, dof} of this.friction ?? []) {
+      const rate = this.data.qvel[dof], slow = law.stribeck_rate > 0 ? Math.exp(-((rate / law.stribeck_rate) ** 2)) : 0;
+      if (Math.abs(rate) > AT_REST) this.data.qfrc_applied[dof] -= Math.sign(rate) * (law.coulomb + (law.breakaway - law.coulomb) * slow);
     }
   }
 

@@ -13,12 +13,15 @@ const METHODS = {
 };
 const DECLINED = [{what: 'joint reactions', why: 'only drives, outputs and loops are read out'}];
 
+// Friction that the joint's load does not raise, of a hinge or slide.
+const isDry = ({law, on}) => law.coulomb !== undefined && law.coefficient === 0 && on.joint !== undefined && on.coordinate === 0;
+
 // What MuJoCo has no word for, or what the generated model leaves to whoever steps it.
 function refuse(mechanism, loads, simulation) {
   const native = (element) => !element.law.carrier && !element.on.bushing && !element.on.spring &&
       (element.kind === 'damping' || element.kind === 'rotor' && element.on.joint ||
        element.kind === 'spring' && element.law.polynomial.length === 1 && element.law.polynomial[0] > 0);
-  const strange = mechanism.elements.filter((element) => !native(element)).map((element) => element.name);
+  const strange = mechanism.elements.filter((element) => !native(element) && !isDry(element)).map((element) => element.name);
   if (mechanism.bushings.length > 0) throw new Refused('MuJoCo has no bushings');
   if (strange.length > 0) throw new Refused(`MuJoCo has no force element like ${strange.join(', ')}`);
   const {mj, model} = simulation;
@@ -88,6 +91,7 @@ function run(simulation, outputs, motion, loads, stiff) {
       const at = motion.at(i, n / steps);
       simulation.setTargets(stiff ? simulation.targetsWithRates(at) : at.map(([position]) => position));
       load(simulation, loads, i, n / steps);
+      simulation.applyFriction();
       if (n === 0) {
         mj.mj_forward(model, data);
         lines.push(record(simulation.driven(), simulation, outputs, time));
@@ -106,6 +110,7 @@ export function witness(engine, method) {
   const motion = readMotion(), loads = readLoads(motion.times.length);
   const simulation = new Simulation(engine, fs.readFileSync('model.xml', 'utf8'), motion.names);
   refuse(mechanism, loads, simulation);
+  simulation.takeFriction(mechanism.elements.filter(isDry));
   const outputs = outputPoses(simulation, mechanism);
   const begun = process.cpuUsage();
   const lines = method === 'inverse' ? runInverse(simulation, outputs, motion, loads) :

@@ -99,13 +99,13 @@ bool HoldTurn(const std::vector<Vec6>& motion, Mechanism* m) {
   return false;
 }
 
-// Rods between two balls that are not quite symmetric about their lines, where nothing but their
-// spins is left free: in a robot friction holds them, and here one of their balls does, if
-// there is one whose rotation no force acts on.
-std::vector<ModelCaveat> HoldUnevenSpins(size_t free, Mechanism* m) {
+// Spins of rods between two balls that are not quite symmetric about their lines, or whose balls
+// damp them: in a robot friction holds them, and here one of their balls does, if there is one
+// whose rotation no force acts on.
+std::vector<ModelCaveat> HoldUnevenSpins(Mechanism* m) {
   std::vector<Spin> spins = FindSpins(*m);
   std::erase_if(spins, [](const Spin& spin) { return spin.why_not.empty(); });
-  if (spins.size() != free) return {};
+  if (spins.empty()) return {};
   const auto is_bare = [m](int ball) {
     return std::ranges::none_of(
         m->elements, [ball](const ForceElement& element) { return element.joint == ball; });
@@ -501,9 +501,8 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   DefaultSetup setup;
   std::vector<Coordinate> by_forces;
   Mechanism m = WithDriveForEachDof(*loaded.mechanism, &setup.notes, &by_forces);
-  std::vector<ModelCaveat> caveats = by_forces.empty()
-                                         ? std::vector<ModelCaveat>()
-                                         : HoldUnevenSpins(by_forces.size(), &*loaded.mechanism);
+  std::vector<ModelCaveat> caveats =
+      by_forces.empty() ? std::vector<ModelCaveat>() : HoldUnevenSpins(&*loaded.mechanism);
   if (!caveats.empty()) {
     setup.notes.clear();
     m = WithDriveForEachDof(*loaded.mechanism, &setup.notes, &by_forces);

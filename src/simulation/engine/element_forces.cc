@@ -375,8 +375,7 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
   for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
     if (released && HasFriction(element)) {
-      const bool by_itself = !own_events || engine.sparse;
-      const std::string why = engine.elements[e].turned >= 0 && by_itself
+      const std::string why = engine.elements[e].turned >= 0 && !own_events
                                   ? "MuJoCo's ball has other axes than the joint's frame on its "
                                     "child, and its frictionloss is limited about each by itself; "
                                     "with all drives commanded it is simulated"

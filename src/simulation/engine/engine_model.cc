@@ -265,6 +265,10 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   }
   MakeAnchorsExact(*engine);
   if (RunSummary summary = FindElements(engine); !summary.ok()) return summary;
+  // Rows of friction about other axes than MuJoCo's have more entries than its sparse ones.
+  if (std::ranges::any_of(engine->elements, [](const auto& at) { return at.turned >= 0; })) {
+    engine->sparse = false;
+  }
   SetForcesOfBalls(engine);
   return FindDriven(engine);
 }

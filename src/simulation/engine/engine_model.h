@@ -54,7 +54,7 @@ struct EngineModel {
   const Mechanism* mechanism = nullptr;
   mjcf::Plan plan;
   ModelHandle m;             ///< set to dense Jacobians
-  bool sparse = false;       ///< it asked for sparse ones
+  bool sparse = false;       ///< it asked for sparse ones, and can have them
   std::vector<int> body_id;  ///< per planned body
   std::vector<DrivenPlace> driven;
   std::vector<int> closure_equality;        ///< per planned closure

@@ -243,6 +243,22 @@ TEST(DefaultSetup, WhereOnlySpinsOfRodsAreLeftOneBallHoldsEach) {
   EXPECT_NE(row.caveats[0].find("the free spin of rod"), std::string::npos);
 }
 
+// Beside a body that swings on a ball, too; this one moves by forces.
+TEST(DefaultSetup, SpinsOfRodsAreHeldBesideOtherRotationsThatForcesMove) {
+  const test::TestFolder folder("uneven_rod_and_bob");
+  std::string both = kRod;
+  both.insert(both.find("joints:"),
+              "  bob: {mass: 1, com: [0.05, 0, -0.3], inertia: [0.01, 0.012, 0.003]}\n");
+  both.insert(both.find("joints:") + 8, "  swing: {kind: spherical, parent: world, child: bob}\n");
+  const std::string file = folder.Write("rod.yaml", both);
+  const DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
+  ASSERT_TRUE(made.setup) << made.diagnostics.Text();
+  EXPECT_EQ(made.setup->by_forces, 3);
+  const Mechanism& m = made.setup->mechanism;
+  EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("B"))].kind, JointKind::kUniversal);
+  EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("swing"))].kind, JointKind::kSpherical);
+}
+
 // One that is symmetric about its line spins idly.
 TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   std::string round = kRod;
