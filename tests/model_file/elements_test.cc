@@ -99,7 +99,7 @@ TEST(Elements, OfPartsNameTheirOwnJointsAndDrives) {
 TEST(Elements, WhatMeansNothingIsAFinding) {
   EXPECT_EQ(ElementFindings("  g: {kind: dumping, joint: turn, damping: 2}\n"),
             "m.yaml:10:13: error: elements.g.kind = 'dumping' is not one of: damping, spring, "
-            "rotor, friction, bushing\n  hint: did you mean 'damping'?\n");
+            "rotor, friction, stop, curve, bushing\n  hint: did you mean 'damping'?\n");
   EXPECT_EQ(ElementFindings("  g: {kind: damping, joint: tern, damping: 2}\n"),
             "m.yaml:10:29: error: elements.g.joint = 'tern': there is no such joint\n"
             "  hint: did you mean 'turn'?\n");
@@ -107,8 +107,9 @@ TEST(Elements, WhatMeansNothingIsAFinding) {
             "m.yaml:10:29: error: elements.g.drive = 'lag': there is no such drive\n"
             "  hint: did you mean 'leg'?\n");
   EXPECT_EQ(ElementFindings("  g: {kind: damping, damping: 2}\n"),
-            "m.yaml:10:6: error: elements.g needs either joint or drive\n"
-            "  hint: joint: the joint along whose coordinate it acts; drive: along that drive's\n");
+            "m.yaml:10:6: error: elements.g needs one of joint, drive, spring, and from with to\n"
+            "  hint: joint: the joint along whose coordinate it acts; drive: along that drive's; "
+            "spring: along its length; from, to: along the distance of two frames\n");
   EXPECT_EQ(ElementFindings("  g: {kind: damping, joint: turn, damping: -2}\n"),
             "m.yaml:10:44: error: elements.g.damping = -2 violates damping >= 0\n");
   EXPECT_EQ(ElementFindings("  g: {kind: spring, joint: turn, stiffness: 2, free_mm: 3}\n"),
@@ -141,7 +142,7 @@ TEST(Elements, FrictionByLoadNeedsAJournalOrAGuide) {
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coulomb: 1, radius: 0.2}\n"),
             "m.yaml:10:56: error: elements.g.radius has no meaning here\n" + radius);
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: slide, coefficient: 0.2, radius: 1}\n"),
-            "m.yaml:10:58: error: elements.g.radius has no meaning here\n" + radius);
+            "m.yaml:10:63: error: elements.g.radius has no meaning here\n" + radius);
   EXPECT_EQ(ElementFindings("  g: {kind: friction, drive: leg, coefficient: 0.2, radius: 1}\n"),
             "m.yaml:10:48: error: elements.g.coefficient: friction by the joint's load is known of "
             "revolute, prismatic, cylindrical, universal and spherical joints only\n"
