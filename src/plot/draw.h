@@ -89,4 +89,15 @@ enum class PictureFormat { kPdf, kSvg, kPng };
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> PgfFiles(const Figure& figure,
                                                                         const FigureStyle& style);
 
+// Plots that other parts of the program describe (math/plot.h) as figures: maps, sections.
+
+[[nodiscard]] Figure FromPlot(const std::string& name, const LinePlot& plot);
+/// Both axes have one scale where they have one unit.
+[[nodiscard]] Figure FromPlot(const std::string& name, const MapPlot& plot);
+/// "Drive force *F* (kN)": name, symbol in markup, unit as shown ("" and "1" have none).
+[[nodiscard]] std::string AxisLabel(const std::string& name, const std::string& symbol,
+                                    const std::string& unit);
+/// "x [mm]" → "*x* (mm)", "k_min [N/m]" → "*k*_{min} (N/m)"; words as they are.
+[[nodiscard]] std::string FigureLabel(const std::string& label);
+
 }  // namespace mbv

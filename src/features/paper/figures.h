@@ -88,17 +88,8 @@ struct FigureSet {
 [[nodiscard]] FigureSet ComposeFigures(const std::vector<FigureSpec>& specs, const Report& report,
                                        Language language);
 
-// Plots that other parts of the program describe (math/plot.h) as figures: maps, sections.
-
-[[nodiscard]] Figure FromPlot(const std::string& name, const LinePlot& plot);
-/// Both axes have one scale where they have one unit.
-[[nodiscard]] Figure FromPlot(const std::string& name, const MapPlot& plot);
-
 /// Sections of workspaces (analytic/workspace_form.h): what they say in words, in a language.
 [[nodiscard]] Figure FromSection(const std::string& name, const LinePlot& plot, Language language);
-
-/// "x [mm]" → "*x* (mm)", "k_min [N/m]" → "*k*_{min} (N/m)"; words as they are.
-[[nodiscard]] std::string FigureLabel(const std::string& label);
 
 // Errors of drive forces against what a simulation is refined by, in logarithmic axes, with lines
 // of the slopes that were fitted; the legend names them beside those that the schemes promise.

@@ -81,12 +81,6 @@ std::string SayWitness(std::string_view name, Language language) {
   return AsPlainText(name);
 }
 
-std::string AxisLabel(const std::string& name, const std::string& symbol, const std::string& unit) {
-  std::string label = name;
-  if (!symbol.empty()) label += (label.empty() ? "" : " ") + symbol;
-  return unit.empty() || unit == "1" ? label : label + " (" + unit + ")";
-}
-
 std::vector<const WitnessRecord*> ShownWitnesses(const Report& report) {
   std::vector<const WitnessRecord*> shown;
   for (const WitnessRecord& record : report.witnesses) {

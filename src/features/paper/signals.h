@@ -54,10 +54,6 @@ enum class FigureWord {
 /// "simulation", of a role's name in files (base/roles.h).
 [[nodiscard]] std::string SayWitness(std::string_view name, Language language);
 
-/// "Drive force *F* (kN)": name, symbol in markup, unit as shown ("" and "1" have none).
-[[nodiscard]] std::string AxisLabel(const std::string& name, const std::string& symbol,
-                                    const std::string& unit);
-
 /// More points than a printer shows across a column are thinned; extremes are kept.
 inline constexpr size_t kFigureBins = 1000;
 /// Spans of differences on a logarithmic scale, of which the largest are shown.

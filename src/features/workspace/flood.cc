@@ -27,7 +27,8 @@ constexpr int kMostCuts = 30;
 constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]; of a plan
 constexpr int kMostStrides = 10000;
 constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
-constexpr double kMostCorners = 4e6;
+constexpr double kGibibyte = 1073741824.0, kMostCorners = 4e6;
+constexpr double kOverhead = 200.0;   // bytes of a corner beside its pose: key, node, allocations
 constexpr size_t kKeptAtOnce = 1024;  // of corners or cuts that are kept at once
 constexpr std::array<int, 4> kUsualResolution = {0, 400, 240, 64};
 
@@ -94,6 +95,7 @@ class Flooder {
         log_(std::move(log)) {
     set_.step = plan.step;
     set_.summary = plan.summary;
+    most_corners_ = plan.most_corners;
   }
 
   FloodedSet Flood() {
@@ -102,6 +104,7 @@ class Flooder {
     if (!set_.summary.ok()) return std::move(set_);
     for (int level = 0; level <= settings_.halvings; ++level) {
       if (level > 0) Refine(level);
+      if (!Fits()) return std::move(set_);
       if (level >= settings_.halvings - 2) {
         CutEdges(level);
         set_.levels.push_back(Measure(level, level == settings_.halvings));
@@ -235,11 +238,7 @@ class Flooder {
         }
       }
       front.assign(next.begin(), next.end());
-      if (static_cast<double>(corners_.size()) > kMostCorners) {
-        set_.summary.stop = Stop::kUnsupported;
-        set_.summary.message = "the set is larger than this resolution can fill";
-        return;
-      }
+      if (!Fits()) return;
       Report(0.3 * (1.0 - 1.0 / (1.0 + 0.1 * static_cast<double>(++waves_))));
     }
     for (const auto& known : corners_) {
@@ -252,6 +251,13 @@ class Flooder {
     }
     Complete(0, {cells_[0].begin(), cells_[0].end()});
     set_.summary = RunSummary::Done();
+  }
+
+  [[nodiscard]] bool Fits() {
+    if (static_cast<double>(corners_.size()) <= most_corners_) return true;
+    set_.summary.stop = Stop::kUnsupported;
+    set_.summary.message = "the set is larger than this --resolution can fill within 2 GiB";
+    return false;
   }
 
   void Report(double fraction) const {
@@ -727,6 +733,7 @@ class Flooder {
   const int k_;
   const Fibre fibre_;
   ResultLog log_;
+  double most_corners_ = kMostCorners;
   FloodedSet set_;
   std::unordered_map<Lattice, Corner, LatticeHash> corners_;
   std::array<std::set<Lattice>, 6> cells_, refined_;  // by level: not refined; refined
@@ -783,12 +790,16 @@ FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodS
   // Coarse cells everywhere, fine ones and their cuts on the boundary.
   const double boundary = 12.0 * k * std::pow(static_cast<double>(resolution), k - 1);
   const double corners = cells / std::exp2(settings.halvings * k) + boundary;
+  plan.closing_s = each;
   plan.estimate_s = each * (corners + 3.0 * boundary) / settings.threads;
-  if (plan.estimate_s > settings.most_s || corners > kMostCorners) {
+  const double bytes = kOverhead + static_cast<double>(sizeof(Corner) + ToBytes(home.pose).size());
+  plan.most_corners = std::min(kMostCorners, 2.0 * kGibibyte / bytes);
+  if (plan.estimate_s > settings.most_s || corners > plan.most_corners) {
     plan.summary.stop = Stop::kUnsupported;
-    plan.summary.message =
-        fmt::format("--resolution {} takes about {} ({:.2g} poses); state a lower one", resolution,
-                    TimeText(plan.estimate_s), corners + 3.0 * boundary);
+    plan.summary.message = fmt::format(
+        "--resolution {} takes about {} ({:.2g} poses) and {:.2g} GiB; state a lower one",
+        resolution, TimeText(plan.estimate_s), corners + 3.0 * boundary,
+        corners * bytes / kGibibyte);
     return plan;
   }
   plan.summary = RunSummary::Done();

@@ -58,12 +58,14 @@ struct FloodedSet {
   double wall_s = 0.0;
 };
 
-/// The spacing by how far the set reaches along the coordinates from home, and how long it takes;
-/// kUnsupported where that is too long, kUnreachable without an end.
+/// The spacing by how far the set reaches along the coordinates from home, how long it takes and
+/// how much it keeps; kUnsupported where that is too much, kUnreachable without an end.
 struct FloodPlan {
   RunSummary summary;
   std::array<double, 3> step{};
   double estimate_s = kNan;
+  double closing_s = kNan;     ///< of one pose, by one thread
+  double most_corners = kNan;  ///< that 2 GiB hold
 };
 [[nodiscard]] FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home,
                                   const FloodSettings& settings);

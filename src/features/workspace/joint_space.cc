@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <random>
+#include <set>
 
 #include "base/text.h"
 #include "kinematics/constraints.h"
@@ -15,7 +17,9 @@
 namespace mbv {
 namespace {
 
-constexpr int kWalks = 8;  // from every way
+constexpr int kLeastWalks = 8, kMostWalks = 64;  // from every way
+constexpr int kHits = 5;                         // of each curve by walks, on the average
+constexpr int kMostNewton = 12;                  // steps to a fold that a walk passes by
 constexpr int kWalkSteps = 400;
 constexpr double kWalkStep = 0.08;  // [rad, characteristic lengths]
 constexpr double kFoldStep = 0.02, kLongestFoldStep = 0.03, kLeastFoldStep = 1e-7;
@@ -49,12 +53,14 @@ class FoldTracer {
     return space_.Place(pose, to);
   }
 
-  // Straight on until f changes its sign, and on; the poses where it does.
+  // Straight on until f changes its sign, and on; the poses where it does. Where |f| is least on
+  // the way, the fold may be near: small closed ones lie between two steps.
   void Walk(const PlacedPose& start, unsigned seed, std::vector<PlacedPose>* folds) const {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     VecX way = start.N_free * Eigen::Vector2d(normal(random), normal(random));
     PlacedPose at = start;
+    double before = 0.0;  // |f| a step ago
     for (int i = 0; i < kWalkSteps; ++i) {
       Eigen::Vector2d along = at.N_free.transpose() * way;
       if (!(along.norm() > 1e-6)) return;
@@ -73,7 +79,11 @@ class FoldTracer {
       if ((at.type1 < 0.0) != (next.type1 < 0.0)) {
         PlacedPose fold;
         if (Across(at, h * along, next.type1, &fold)) folds->push_back(std::move(fold));
+      } else if (const double f = std::abs(at.type1); f < before && f < std::abs(next.type1)) {
+        PlacedPose fold;
+        if (Descend(at, &fold) && Within(fold)) folds->push_back(std::move(fold));
       }
+      before = std::abs(at.type1);
       at = std::move(next);
     }
   }
@@ -160,6 +170,20 @@ class FoldTracer {
     };
     return FindCrossing(0.0, at.type1, 1.0, f1, value,
                         [](double f, double /*width*/) { return std::abs(f) < kOnFold; });
+  }
+
+  // From a pose near a fold straight to it (Newton).
+  [[nodiscard]] bool Descend(const PlacedPose& start, PlacedPose* to) const {
+    *to = start;
+    for (int i = 0; i < kMostNewton; ++i) {
+      if (std::abs(to->type1) < kOnFold) return true;
+      const VecX slope = space_.Slope(*to, fold_);
+      const VecX step = -to->type1 / slope.squaredNorm() * slope;
+      PlacedPose next;
+      if (!(step.norm() < 2 * kWalkStep) || !space_.Step(*to, step, &next)) return false;
+      *to = std::move(next);
+    }
+    return false;
   }
 
   PoseSpace space_;
@@ -280,31 +304,44 @@ JointSpaceCurves TraceJointSpace(const Mechanism& mechanism,
   result.summary = modes.summary;
   if (!modes.summary.ok()) return result;
   result.ways = modes.modes.size();
-  std::vector<PlacedPose> folds;
-  for (size_t k = 0; k < modes.modes.size(); ++k) {
+  std::vector<PlacedPose> starts;
+  for (const AssemblyMode& mode : modes.modes) {
     PlacedPose start;
-    if (!tracer.Place(modes.modes[k].pose, &start)) continue;
-    for (int w = 0; w < kWalks; ++w) {
-      tracer.Walk(start, static_cast<unsigned>(1000 * k) + static_cast<unsigned>(w), &folds);
-    }
-    if (progress) progress(0.5 * static_cast<double>(k + 1) / static_cast<double>(result.ways));
+    if (tracer.Place(mode.pose, &start)) starts.push_back(std::move(start));
   }
   std::vector<std::vector<VecX>> known;  // points of the curves
+  std::vector<int> hits;                 // walks that met them
   std::vector<VecX> cusp_points;
-  for (const PlacedPose& fold : folds) {
-    const VecX point = tracer.Point(fold);
-    const bool is_known = std::ranges::any_of(known, [&](const std::vector<VecX>& curve) {
-      for (size_t i = 1; i < curve.size(); ++i) {
-        if (OffSegment(curve[i - 1], curve[i], point) < kSameFold) return true;
+  // The rule of modes.h: until each curve was met more than once, and all often.
+  const auto settled = [&] {
+    return std::ranges::find(hits, 1) == hits.end() &&
+           std::accumulate(hits.begin(), hits.end(), 0) >= kHits * static_cast<int>(hits.size());
+  };
+  for (int w = 0; w < kMostWalks && (w < kLeastWalks || !settled()); ++w) {
+    for (size_t k = 0; k < starts.size(); ++k) {
+      std::vector<PlacedPose> folds;
+      tracer.Walk(starts[k], static_cast<unsigned>(1000 * k) + static_cast<unsigned>(w), &folds);
+      std::set<size_t> met;
+      for (const PlacedPose& fold : folds) {
+        const VecX point = tracer.Point(fold);
+        const auto curve = std::ranges::find_if(known, [&](const std::vector<VecX>& points) {
+          for (size_t i = 1; i < points.size(); ++i) {
+            if (OffSegment(points[i - 1], points[i], point) < kSameFold) return true;
+          }
+          return false;
+        });
+        met.insert(static_cast<size_t>(curve - known.begin()));
+        if (curve != known.end()) continue;
+        known.emplace_back();
+        hits.push_back(0);
+        if (!TraceFold(mechanism, tracer, fold, &known.back(), &cusp_points, &result)) {
+          result.summary.stop = Stop::kNoConvergence;
+          result.summary.message = "a type-2 curve cannot be followed where it crosses another one";
+        }
       }
-      return false;
-    });
-    if (is_known) continue;
-    known.emplace_back();
-    if (!TraceFold(mechanism, tracer, fold, &known.back(), &cusp_points, &result)) {
-      result.summary.stop = Stop::kNoConvergence;
-      result.summary.message = "a type-2 curve cannot be followed where it crosses another one";
+      for (const size_t curve : met) ++hits[curve];
     }
+    if (progress) progress(std::min(1.0, (w + 1.0) / kLeastWalks));
   }
   return result;
 }

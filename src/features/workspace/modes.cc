@@ -555,6 +555,16 @@ ModesOfPose FindModesOfPose(const SetQuestion& question, bool of_drives, bool of
   return result;
 }
 
+Mechanism WithHomeAt(const Mechanism& mechanism, const AssemblyMode& mode) {
+  Mechanism result = mechanism;
+  std::vector<std::array<double, 6>> near;
+  for (const Joint& joint : mechanism.joints) near.push_back(joint.home);
+  result.X_WB_home = ChainPoses(mechanism, mode.pose.X_FM);
+  const auto at = JointCoordinatesAt(mechanism, result.X_WB_home, near);
+  for (size_t j = 0; j < at.size(); ++j) result.joints[j].guess = result.joints[j].home = at[j];
+  return result;
+}
+
 std::string ToText(const Mechanism& mechanism, const ModesOfPose& modes, const TextStyle& style) {
   std::string text;
   for (const auto& [of, found] : modes.of) text += ToText(ModesSection(mechanism, found), style);

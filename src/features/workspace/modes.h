@@ -69,6 +69,9 @@ struct ModesOfPose {
                                           const ProgressFunction& progress,
                                           Diagnostics* diagnostics);
 
+/// The model whose home is one of the ways to close.
+[[nodiscard]] Mechanism WithHomeAt(const Mechanism& mechanism, const AssemblyMode& mode);
+
 [[nodiscard]] std::string ToText(const Mechanism& mechanism, const ModesOfPose& modes,
                                  const TextStyle& style);
 [[nodiscard]] nlohmann::ordered_json ToJson(const Mechanism& mechanism, const ModesOfPose& modes);

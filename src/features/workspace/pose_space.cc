@@ -34,10 +34,11 @@ Eigen::RowVectorXd Projected(const ScalarRow& row, const MatX& J) {
 }  // namespace
 
 const char* WordOf(SetBound::Kind kind) {
-  constexpr std::array<const char*, 7> kWords = {"drive",
+  constexpr std::array<const char*, 8> kWords = {"drive",
                                                  "joint",
                                                  "cone",
                                                  "box",
+                                                 "interference",
                                                  "constraint singularity",
                                                  "type-1 singularity",
                                                  "type-2 singularity"};
@@ -137,13 +138,20 @@ void PoseSpace::AddBounds() {
     AddRange(named.coordinate, SetBound::Kind::kJoint, named.name,
              joint.range[static_cast<size_t>(named.coordinate.component)]);
   }
+  // A spherical joint's range is one of its rotation as a whole.
+  for (const Joint& joint : m.joints) {
+    if (joint.max_rotation < std::numbers::pi) {
+      settings_.cones.push_back(
+          {static_cast<int>(&joint - m.joints.data()), Vec3::Zero(), joint.max_rotation});
+    }
+  }
   for (size_t c = 0; c < settings_.cones.size(); ++c) {
     const JointCone& cone = settings_.cones[c];
     const std::string& joint = m.joints[static_cast<size_t>(cone.joint)].name;
-    bounds_.push_back(
-        {SetBound::Kind::kCone,
-         fmt::format("cone of {} at {:.6g}°", joint, cone.angle * 180.0 / std::numbers::pi), joint,
-         true, cone.angle, static_cast<int>(c), "rad"});
+    bounds_.push_back({SetBound::Kind::kCone,
+                       fmt::format("{} of {} at {:.6g}°", cone.axis.isZero() ? "rotation" : "cone",
+                                   joint, cone.angle * 180.0 / std::numbers::pi),
+                       joint, true, cone.angle, static_cast<int>(c), "rad"});
   }
   for (size_t k = 0; k < settings_.box.size(); ++k) {
     for (const bool upper : {false, true}) {
@@ -153,6 +161,13 @@ void PoseSpace::AddBounds() {
       bounds_.push_back({SetBound::Kind::kBox, fmt::format("box {} = {:.6g}", name, limit), name,
                          upper, limit, static_cast<int>(k),
                          UnitOf(static_cast<int>(k)) == length_ ? "m" : "rad"});
+    }
+  }
+  if (settings_.clearance > 0.0) {
+    shapes_ = std::make_shared<ShapePairs>(PairsOfShapes(m, settings_.clearance));
+    for (size_t k = 0; k < shapes_->pairs.size(); ++k) {
+      bounds_.push_back({SetBound::Kind::kShapes, shapes_->names[k], shapes_->names[k], false,
+                         settings_.clearance, static_cast<int>(k), "m"});
     }
   }
   bounds_.push_back({SetBound::Kind::kConstraint, "constraint singularity", "", false, 0.0, -1});
@@ -355,6 +370,7 @@ bool PoseSpace::Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const {
       if (IsLength(m, coordinate)) D.row(k) /= length_;
     }
     to->type2 = pose.side * D.determinant() / home_type2_;
+    to->type2_size = D.rowwise().norm().prod();
   }
   if (pose.watched.size() == 0) {
     pose.watched.resize(static_cast<Eigen::Index>(watched_.size()));
@@ -392,7 +408,18 @@ bool PoseSpace::Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const {
                 .transpose() *
             rows->states.X_WB[static_cast<size_t>(joint.child)].linear() * joint.X_CM.linear();
         const Vec3 turned = R_FM * cone.axis;
-        margin = cone.angle - std::atan2(cone.axis.cross(turned).norm(), cone.axis.dot(turned));
+        margin = cone.angle - (cone.axis.isZero()
+                                   ? Eigen::AngleAxisd(R_FM).angle()
+                                   : std::atan2(cone.axis.cross(turned).norm(),
+                                                cone.axis.dot(turned)));
+        break;
+      }
+      case SetBound::Kind::kShapes: {
+        const auto& [i, j] = shapes_->pairs[static_cast<size_t>(bound.watched)];
+        const ConvexShape &one = shapes_->shapes[i], &other = shapes_->shapes[j];
+        margin = GapOf(one, rows->states.X_WB[static_cast<size_t>(one.body)], other,
+                       rows->states.X_WB[static_cast<size_t>(other.body)]) -
+                 bound.limit;
         break;
       }
       case SetBound::Kind::kConstraint:
@@ -436,7 +463,10 @@ bool PoseSpace::Home(PlacedPose* home) {
 
 void PoseSpace::CountFrom(PlacedPose* home) {
   home_type1_ *= home->type1;
-  if (std::isfinite(home->type2)) home_type2_ *= home->type2;
+  // Positive; by its rows' size, as home itself may be near type 2.
+  if (std::isfinite(home->type2)) {
+    home_type2_ = std::copysign(home->type2_size, home_type2_ * home->type2);
+  }
   home_least_ = home->least;
   Rows rows;
   Evaluate(&home->pose, &rows);

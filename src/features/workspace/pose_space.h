@@ -13,10 +13,12 @@
 // Neither way to a set of poses (flood.h, trace.h) uses more of the other than this file.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "base/types.h"
+#include "features/workspace/interference.h"
 #include "kinematics/tree_motion.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
@@ -50,13 +52,14 @@ template <typename Function, typename Enough>
 
 /// What may end a set of poses: its margin is positive inside, zero there [SI, or 1].
 struct SetBound {
-  enum class Kind { kDrive, kJoint, kCone, kBox, kConstraint, kType1, kType2 };
+  enum class Kind { kDrive, kJoint, kCone, kBox, kShapes, kConstraint, kType1, kType2 };
   Kind kind = Kind::kDrive;
   std::string name;     ///< "leg1 at 0.75 m": of drive, joint and side, to read
   std::string subject;  ///< of drive, joint or coordinate; "" of singularities
   bool upper = false;
   double limit = 0.0;  ///< [m or rad]
-  int watched = -1;    ///< of SpacePose::watched, of kBox a coordinate, of kCone one of the cones
+  int watched = -1;    ///< of SpacePose::watched; kBox: a coordinate, kCone: one of the cones,
+                       ///< kShapes: a pair
   std::string unit = "1";  ///< of its margin: "m", "rad", "1"
 };
 [[nodiscard]] const char* WordOf(SetBound::Kind kind);
@@ -69,10 +72,11 @@ struct SetBound {
   return kind < SetBound::Kind::kCone || kind == SetBound::Kind::kBox;
 }
 
-/// The axis a of M in a joint stays within an angle of the same axis in F.
+/// The axis a of M in a joint stays within an angle of the same axis in F; without an axis: the
+/// rotation as a whole does.
 struct JointCone {
   int joint = -1;
-  Vec3 axis = Vec3::UnitZ();  ///< unit, in F and in M
+  Vec3 axis = Vec3::UnitZ();  ///< unit, in F and in M; or 0
   double angle = kNan;        ///< [rad], 0 … π
 };
 
@@ -88,6 +92,7 @@ struct SpaceSettings {
   VecX held;                                 ///< values of the others [m or rad]
   std::vector<CoordinateRange> box;          ///< per free coordinate
   std::vector<JointCone> cones;
+  double clearance = kNan;               ///< of bodies' shapes [m]; NaN: they may touch
   bool cross_type2 = false;              ///< drives that lose their hold end nothing
   std::vector<RangedCoordinate> ranged;  ///< fibre.h
   bool for_all = false;                  ///< of them, or for some
@@ -119,7 +124,9 @@ struct PlacedPose {
   MatX C_free;          ///< over × over: rates of the free coordinates [m or rad] along N_free
   MatX watched_free;    ///< watched × over
   double type1 = kNan;  ///< det G, 1 at home
-  double type2 = kNan;  ///< det D, 1 at home; NaN: not as many drives as degrees of freedom
+  double type2 = kNan;  ///< det D by the product of its rows at home, > 0 there; NaN: not as many
+                        ///< drives as degrees of freedom
+  double type2_size = kNan;  ///< product of the rows of D
   double least = kNan;  ///< of A: its last pivot by its first
 };
 
@@ -137,6 +144,7 @@ class PoseSpace {
   [[nodiscard]] const SpaceSettings& settings() const { return settings_; }
   [[nodiscard]] const std::vector<SetBound>& bounds() const { return bounds_; }
   [[nodiscard]] const Mechanism& mechanism() const { return *mechanism_; }
+  [[nodiscard]] const ShapePairs* shapes() const { return shapes_.get(); }
   [[nodiscard]] double length() const { return length_; }
   [[nodiscard]] bool has_idle_spins() const { return !spins_.empty(); }
   /// A length that a free coordinate's unit counts as: the characteristic one, or 1 rad.
@@ -209,6 +217,7 @@ class PoseSpace {
   VecX unit_;  ///< per tree coordinate: length_ or 1
   std::vector<Spin> spins_;
   std::vector<Watched> watched_;
+  std::shared_ptr<const ShapePairs> shapes_;  ///< null without a clearance
   std::vector<SetBound> bounds_;
   std::vector<Coordinate> driven_;  ///< drives, prescribed joints
   int rank_ = 0;                    ///< of A at home

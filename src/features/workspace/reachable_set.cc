@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "base/text.h"
+#include "base/worker_pool.h"
 #include "features/workspace/fibre.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
@@ -25,6 +26,7 @@ constexpr size_t kMostNamed = 8;         // names in a message
 constexpr double kSingularHome = 1e-10;  // determinants of orthonormal motions below it are zero
 constexpr size_t kMostChecked = 24;
 constexpr double kMostError = 0.2;  // of both ways together, by the measure
+constexpr double kLong_s = 10.0;    // what takes longer is announced
 constexpr double kSamePose = 1e-8;  // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 
@@ -61,7 +63,8 @@ class QuestionReader {
     if (failed_ || !Choose()) return std::nullopt;
     question_.output = output_;
     question_.ranges_changed =
-        !arguments_.ranges.empty() || !arguments_.cones.empty() || !ranged_.empty();
+        !arguments_.ranges.empty() || !arguments_.cones.empty() || !ranged_.empty() ||
+        std::isfinite(arguments_.clearance);
     return std::move(question_);
   }
 
@@ -77,19 +80,44 @@ class QuestionReader {
       output_ = m.outputs.empty() ? "" : m.outputs.front().name;
       if (m.outputs.empty() && arguments_.over.empty()) {
         Error(m.file, "the model has no output, whose poses could be asked",
-              "state outputs: in the model, or name joints or drives by --over");
+              "name a body or a frame by --output, joints or drives by --over, or state outputs: in "
+              "the model");
       }
       return !failed_;
     }
     output_ = arguments_.output;
-    if (m.FindOutput(output_) >= 0) return true;
+    if (m.FindOutput(output_) >= 0 || AddOutput()) return true;
     std::vector<std::string> names;
     for (const Output& output : m.outputs) names.push_back(output.name);
+    for (size_t b = 1; b < m.bodies.size(); ++b) names.push_back(m.bodies[b].name);
     Error("--output " + output_, "there is no such output",
           DidYouMean(
               output_, names,
-              names.empty() ? "the model has none" : "there are: " + Joined(names, kMostNamed)));
+              "there are: " + Joined(names, kMostNamed)));
     return false;
+  }
+
+  // A moving body, "BODY.FRAME" or a frame whose name is used once, in the world: robots' files state
+  // no outputs.
+  bool AddOutput() {
+    Mechanism& m = question_.mechanism;
+    std::vector<Output> found;
+    for (size_t b = 1; b < m.bodies.size(); ++b) {
+      const Body& body = m.bodies[b];
+      Output output{.name = output_, .body = static_cast<int>(b)};
+      if (body.name == output_) {
+        found = {output};
+        break;
+      }
+      for (const NamedFrame& frame : body.frames) {
+        if (frame.name != output_ && body.name + "." + frame.name != output_) continue;
+        output.X_BO = frame.X_BF;
+        found.push_back(output);
+      }
+    }
+    if (found.size() != 1) return false;
+    m.outputs.push_back(found.front());
+    return true;
   }
 
   // "x" is the output's.
@@ -325,6 +353,7 @@ class QuestionReader {
     const Mechanism& m = question_.mechanism;
     SpaceSettings& settings = question_.settings;
     settings.cross_type2 = arguments_.cross_singularities;
+    settings.clearance = arguments_.clearance;
     if (over_.empty()) ChooseFree();
     std::vector<NamedCoordinate> candidates = over_;
     const auto add = [&](const NamedCoordinate& named) {
@@ -655,6 +684,13 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     result.notes.push_back("drives without a range, which end nothing: " +
                            Joined(endless, kMostNamed));
   }
+  if (const ShapePairs* shapes = space.shapes(); shapes != nullptr) {
+    if (shapes->pairs.empty()) result.notes.emplace_back("no shapes can touch");
+    if (!shapes->touching.empty()) {
+      result.notes.push_back("nearer than the clearance at home, so their shapes end nothing: " +
+                             Joined(shapes->touching, kMostNamed));
+    }
+  }
   result.length = space.length();
   result.start_pose = start.pose;
   result.bounds = space.bounds();
@@ -665,6 +701,15 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     result.summary = plan.summary;
     result.verdict = plan.summary.message;
     return result;
+  }
+  const double boundary_s =
+      settings.over == 3 ? plan.closing_s * static_cast<double>(kEnoughClosings) / arguments.flood.threads : 0.0;
+  if (which.lattice && which.announce && plan.estimate_s + boundary_s > kLong_s) {
+    which.announce(fmt::format(
+        "the lattice takes about {}{}", TimeText(plan.estimate_s),
+        settings.over == 3 ? fmt::format(", the boundary up to {} (a million poses)",
+                                         TimeText(boundary_s))
+                           : ""));
   }
   // Both ways at once; neither knows of the other.
   FloodSettings flood = arguments.flood;
@@ -702,6 +747,11 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     result.summary = which.boundary ? result.traced.summary : result.flooded.summary;
     if (!result.summary.ok()) result.verdict = result.summary.message;
     return result;
+  }
+  if (!result.traced.gone.empty()) {
+    result.notes.push_back(fmt::format(
+        "{} sections have no boundary, and what lies about them counts as error: {}",
+        result.traced.gone.size(), result.traced.gone.front()));
   }
   if (result.traced.summary.ok()) CheckByReference(question, space, &result);
   FindShares(&result);

@@ -1,6 +1,7 @@
 // The set of poses that any model reaches: what is asked, both ways to it, and whether they agree.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <string>
@@ -25,6 +26,7 @@ struct SetArguments {
   std::vector<std::string> ranges;  ///< "leg1=0.5:0.75": instead of the model's
   std::vector<std::string> cones;   ///< "ball_deg=30", "ball.x_deg=30": of the axis z, or x or y
   std::vector<std::string> for_all, for_some;  ///< "yaw_deg=-10:10": fibre.h
+  double clearance = kNan;                     ///< that shapes keep [m]; NaN: they may touch
   bool cross_singularities = false;            ///< type 2 ends nothing
   FloodSettings flood;
 
@@ -89,6 +91,8 @@ struct ReachableSet {
 struct SetWays {
   bool boundary = true, lattice = true;
   double share = 1e-8;  ///< of a volume, the error of its boundary
+  /// How long it will take, before it begins; where that is long.
+  std::function<void(const std::string&)> announce = {};
 };
 
 /// With a folder, going on with what an interrupted run of the same question left there.

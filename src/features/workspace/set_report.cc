@@ -8,9 +8,11 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <variant>
 
 #include "base/text.h"
 #include "base/worker_pool.h"
+#include "plot/draw.h"
 #include "plot/svg_plot.h"
 #include "report/page.h"
 
@@ -25,7 +27,7 @@ constexpr size_t kMostDrawnBounds = 16;
 double Shown(double value, const std::string& unit) {
   return unit == "rad" ? value * 180.0 / std::numbers::pi : 1e3 * value;
 }
-const char* ShownUnit(const std::string& unit) { return unit == "rad" ? "°" : "mm"; }
+const char* UnitShown(const std::string& unit) { return unit == "rad" ? "°" : "mm"; }
 
 std::string WithError(double value, double error) {
   if (!std::isfinite(value)) return "–";
@@ -49,7 +51,7 @@ std::string PlaceText(const ReachableSet& set, const Vec3& at) {
     const std::string& unit = set.over_units[c];
     const double value = Shown(at[static_cast<Eigen::Index>(c)], unit);
     parts.push_back(fmt::format("{} {:.4g} {}", set.over[c], std::abs(value) < 1e-9 ? 0.0 : value,
-                                ShownUnit(unit)));
+                                UnitShown(unit)));
   }
   return Joined(parts);
 }
@@ -70,7 +72,7 @@ std::string RangedText(const ReachableSet& set) {
     if (range == nullptr) continue;
     const std::string& unit = set.held_units[k];
     parts.push_back(fmt::format("{} {:.5g} … {:.5g} {}", set.held[k], Shown(range->lower, unit),
-                                Shown(range->upper, unit), ShownUnit(unit)));
+                                Shown(range->upper, unit), UnitShown(unit)));
   }
   return parts.empty() ? "" : (set.for_all ? " for all " : " for some ") + Joined(parts);
 }
@@ -82,7 +84,7 @@ std::string HeldText(const ReachableSet& set) {
     const std::string& unit = set.held_units[k];
     const double value = Shown(set.held_values[static_cast<Eigen::Index>(k)], unit);
     parts.push_back(fmt::format("{} = {:.5g} {}", set.held[k],
-                                std::abs(value) < 1e-12 ? 0.0 : value, ShownUnit(unit)));
+                                std::abs(value) < 1e-12 ? 0.0 : value, UnitShown(unit)));
   }
   return Joined(parts);
 }
@@ -141,7 +143,7 @@ Table LevelsTable(const ReachableSet& set) {
     for (size_t c = 0; c < set.over.size(); ++c) {
       sizes.push_back(fmt::format("{:.3g} {}",
                                   Shown(factor * set.flooded.step.at(c), set.over_units[c]),
-                                  ShownUnit(set.over_units[c])));
+                                  UnitShown(set.over_units[c])));
     }
     const double value = set.flooded.levels[k];
     table.rows.push_back({Joined(sizes), fmt::format("{:.9g}", value),
@@ -169,7 +171,7 @@ Table QualityTable(const SetReport& report) {
 // Figures.
 
 std::string AxisLabel(const ReachableSet& set, size_t c) {
-  return fmt::format("{} [{}]", set.over[c], ShownUnit(set.over_units[c]));
+  return fmt::format("{} [{}]", set.over[c], UnitShown(set.over_units[c]));
 }
 
 void Append(const ReachableSet& set, const TracedArc& arc, PlotLine* line) {
@@ -224,7 +226,7 @@ LinePlot SectionsPlot(const SetReport& report) {
         [&](const TracedSection& section) { return std::abs(section.height - height); });
     PlotLine line{.label = fmt::format("{} = {:.4g} {}", set.over[2],
                                        Shown(nearest->height, set.over_units[2]),
-                                       ShownUnit(set.over_units[2])),
+                                       UnitShown(set.over_units[2])),
                   .points = {}};
     for (const TracedLoop& loop : nearest->loops) {
       if (!line.points.empty()) line.points.emplace_back(kNan, kNan);
@@ -294,23 +296,27 @@ LinePlot QualityLine(const SetReport& report, size_t index) {
   return plot;
 }
 
-std::vector<std::pair<std::string, std::string>> Figures(const SetReport& report) {
+// By the names of their files, without endings.
+std::vector<std::pair<std::string, std::variant<LinePlot, MapPlot>>> Plots(
+    const SetReport& report) {
   const ReachableSet& set = report.set;
-  std::vector<std::pair<std::string, std::string>> figures;
+  std::vector<std::pair<std::string, std::variant<LinePlot, MapPlot>>> plots;
   if (set.over.size() == 2 && !set.traced.sections.empty()) {
-    figures.emplace_back("reachable_boundary.svg", ToSvg(BoundaryPlot(report)));
+    plots.emplace_back("reachable_boundary", BoundaryPlot(report));
   }
   if (set.over.size() == 3 && !set.traced.sections.empty()) {
-    figures.emplace_back("reachable_sections.svg", ToSvg(SectionsPlot(report)));
+    plots.emplace_back("reachable_sections", SectionsPlot(report));
   }
   for (size_t i = 0; i < report.quality.indices.size(); ++i) {
     const QualityIndex& index = report.quality.indices[i];
     if (!std::isfinite(index.mean) || set.over.size() > 2) continue;
-    figures.emplace_back("quality_" + index.name + ".svg", set.over.size() == 2
-                                                               ? ToSvg(QualityPlot(report, i))
-                                                               : ToSvg(QualityLine(report, i)));
+    if (set.over.size() == 2) {
+      plots.emplace_back("quality_" + index.name, QualityPlot(report, i));
+    } else {
+      plots.emplace_back("quality_" + index.name, QualityLine(report, i));
+    }
   }
-  return figures;
+  return plots;
 }
 
 // Sections.
@@ -328,7 +334,13 @@ Paragraph VerdictOf(const SetReport& report) {
 
 std::vector<ReportSection> SectionsOf(const SetReport& report) {
   const ReachableSet& set = report.set;
-  const auto figures = Figures(report);
+  const auto plots = Plots(report);
+  const auto draw = [&](const char* beginning, ReportSection* section) {
+    for (const auto& [name, plot] : plots) {
+      if (!name.starts_with(beginning)) continue;
+      section->Add(Drawing{std::visit([](const auto& of) { return ToSvg(of); }, plot)}, On::kPage);
+    }
+  };
   std::vector<ReportSection> sections;
   ReportSection reached{.title = "What is reached", .link = "Set"};
   reached.Add(VerdictOf(report));
@@ -360,9 +372,7 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
 
   ReportSection bounds{.title = "What ends it", .link = "Bounds"};
   bounds.Add(BoundsTable(set));
-  for (const auto& [name, svg] : figures) {
-    if (name.starts_with("reachable_")) bounds.Add(Drawing{svg}, On::kPage);
-  }
+  draw("reachable_", &bounds);
   if (!report.quality.singular.empty()) {
     bounds.Note(fmt::format("{} curves inside the set where the drives lose their hold (type 2)",
                             report.quality.singular.size()),
@@ -385,9 +395,7 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
       if (std::isfinite(index.mean)) about.texts.push_back(index.name + ": " + index.about);
     }
     quality.Add(Fold{"what they mean", {{std::move(about), On::kPage}}}, On::kPage);
-    for (const auto& [name, svg] : figures) {
-      if (name.starts_with("quality_")) quality.Add(Drawing{svg}, On::kPage);
-    }
+    draw("quality_", &quality);
     if (!report.quality.no_limb.empty()) {
       quality.Note("no transmission angles of " + Joined(report.quality.no_limb, 8) +
                        ": not one single chain from base to output",
@@ -603,7 +611,8 @@ Json ToJson(const SetReport& report) {
   return json;
 }
 
-std::vector<std::pair<std::string, std::string>> SetFiles(const SetReport& report) {
+std::vector<std::pair<std::string, std::string>> SetFiles(const SetReport& report,
+                                                          const PrintedFigures& printed) {
   const ReachableSet& set = report.set;
   Page page;
   for (const ReportSection& section : SectionsOf(report)) page.Add(section);
@@ -619,7 +628,15 @@ std::vector<std::pair<std::string, std::string>> SetFiles(const SetReport& repor
                              "reachable_poses.csv the lattice with its qualities."})},
       {"reachable_boundary.csv", BoundaryCsv(report)},
       {"reachable_poses.csv", PosesCsv(report)}};
-  for (auto& figure : Figures(report)) files.push_back(std::move(figure));
+  for (const auto& [name, plot] : Plots(report)) {
+    files.emplace_back(name + ".svg", std::visit([](const auto& of) { return ToSvg(of); }, plot));
+    for (const auto& [ending, format] :
+         {std::pair("pdf", PictureFormat::kPdf), {"png", PictureFormat::kPng}}) {
+      if (std::ranges::find(printed.formats, ending) == printed.formats.end()) continue;
+      const Figure figure = std::visit([](const auto& of) { return FromPlot("", of); }, plot);
+      files.emplace_back(name + "." + ending, DrawFigure(figure, printed.style, format));
+    }
+  }
   if (!IsSolid(set)) return files;
   const TriangleMesh mesh = MeshOf(set);
   const std::string title = report.mechanism + ": " + HeadLine(report);

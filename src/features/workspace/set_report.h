@@ -7,6 +7,7 @@
 
 #include "base/json_text.h"
 #include "features/workspace/quality.h"
+#include "plot/style.h"
 #include "report/document.h"
 
 namespace mbv {
@@ -31,9 +32,15 @@ struct SetReport {
 
 [[nodiscard]] std::string ToText(const SetReport& report, const TextStyle& style);
 [[nodiscard]] nlohmann::ordered_json ToJson(const SetReport& report);
+/// Figures for print, beside those of the page.
+struct PrintedFigures {
+  std::vector<std::string> formats;  ///< "pdf", "png"
+  FigureStyle style;
+};
 /// The page, boundary and poses as CSV, figures, and of three dimensions the surface as STL and PLY
 /// with a colour per bound.
-[[nodiscard]] std::vector<std::pair<std::string, std::string>> SetFiles(const SetReport& report);
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> SetFiles(
+    const SetReport& report, const PrintedFigures& printed = {});
 /// The surface of a set over x, y and z of an output, a mesh per bound, in the output's reference
 /// frame; else empty.
 [[nodiscard]] std::vector<std::pair<TriangleMesh, std::string>> ColoredSurface(

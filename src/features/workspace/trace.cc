@@ -24,6 +24,8 @@ using std::numbers::pi;
 
 constexpr int kDegree = 8;           // of the polynomials along a step
 constexpr double kTail = 1e-9;       // last coefficients by the size of the set
+constexpr double kOnBound = 1e-2;   // of the margins before and behind it
+constexpr double kRoundings = 10.0;  // by which a margin at a crossing is off, from what it is
 constexpr double kBeyond = 1e-9;     // margins below −this are outside
 constexpr double kDip = 1e-8;        // the same between two nodes, by their polynomial
 constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
@@ -37,19 +39,25 @@ constexpr int kRays = 8, kChords = 12;  // from home; from each loop
 constexpr size_t kMostSections = 1200;
 // Beyond, a volume has the error that it has; a rough one goes on for longer.
 constexpr double kRough = 1e-3;
-constexpr long kEnoughClosings = 1000000, kMostClosings = 6000000;
+constexpr long kMostClosings = 6000000;
 constexpr double kEndsShare = 0.1;   // of the progress
 constexpr double kSliver = 1e-3;     // of a part, within which its ends are known
 constexpr double kMoved = 0.02;      // of a solid's height, by which its ends have moved
+constexpr double kSlab = 1e-6, kWider = 4.0;  // of a solid's height, about a section that is lost
+constexpr double kMostSlabs = 0.01;
 constexpr size_t kNearSections = 2;  // on each side, whose poses begin another one
 
 // Root of a continuous function with different signs at both ends (Illinois), to rounding.
 template <typename F>
 double Root(const F& f, double a, double fa, double b, double fb, double tolerance) {
   if (fa == 0.0) return a;
-  for (int i = 0; i < 80 && std::abs(b - a) > tolerance; ++i) {
+  double before = std::abs(b - a);
+  for (int i = 0; i < 200 && std::abs(b - a) > tolerance; ++i) {
     double c = b - fb * (b - a) / (fb - fa);
-    if (!std::isfinite(c) || i % 16 == 15) c = 0.5 * (a + b);
+    // Halves where it is slow: at roots of higher order.
+    const bool slow = i % 4 == 3 && std::abs(b - a) > 0.25 * before;
+    if (i % 4 == 3) before = std::abs(b - a);
+    if (!std::isfinite(c) || slow) c = 0.5 * (a + b);
     const double fc = f(c);
     if (!std::isfinite(fc) || fc == 0.0) return c;
     if ((fc < 0.0) != (fb < 0.0)) {
@@ -159,8 +167,11 @@ class Tracer {
       }
       if (next.pose.margin.minCoeff() < 0.0) {
         auto hit = Exit(at, along, h, next);
-        if (!hit) trouble_ = "poses are lost where a path leaves the set";
-        return hit;
+        if (hit) return hit;
+        h *= 0.5;  // it left the branch between both
+        if (h >= kLeastStep) continue;
+        trouble_ = "poses are lost where a path leaves the set";
+        return std::nullopt;
       }
       length += h;
       if (length > kFar) {
@@ -194,25 +205,38 @@ class Tracer {
                 std::vector<SpacePose>* inside);
 
  private:
-  std::optional<Hit> Exit(const PlacedPose& at, const VecX& along, double h,
-                          const PlacedPose& next) {
-    double first = h;
-    int bound = -1;
-    for (Eigen::Index j = 0; j < next.pose.margin.size(); ++j) {
-      if (next.pose.margin[j] >= 0.0) continue;
-      const auto margin = [&](double s) {
-        PlacedPose there;
-        return space_.Step(at, s * along, &there) ? there.pose.margin[j] : kNan;
-      };
-      const double s =
-          Root(margin, 0.0, std::max(at.pose.margin[j], 0.0), h, next.pose.margin[j], 1e-14);
-      if (bound >= 0 && s >= first) continue;
-      first = s;
-      bound = static_cast<int>(j);
+  // The first bound between a pose inside and one that is not. Margins may vanish several times on
+  // the way: again up to where the first root is, until no other one is negative there.
+  std::optional<Hit> Exit(const PlacedPose& at, const VecX& along, double h, PlacedPose next) {
+    for (size_t i = 0; i <= 2 * space_.bounds().size(); ++i) {
+      Hit hit;
+      double first = h;
+      for (Eigen::Index j = 0; j < next.pose.margin.size(); ++j) {
+        if (next.pose.margin[j] >= 0.0) continue;
+        const auto margin = [&](double s) {
+          PlacedPose there;
+          return space_.Step(at, s * along, &there) ? there.pose.margin[j] : kNan;
+        };
+        const double s =
+            Root(margin, 0.0, std::max(at.pose.margin[j], 0.0), h, next.pose.margin[j], 1e-14);
+        if (hit.bound >= 0 && s >= first) continue;
+        first = s;
+        hit.bound = static_cast<int>(j);
+      }
+      if (hit.bound < 0 || !space_.Step(at, first * along, &hit.at)) return std::nullopt;
+      const VecX& margin = hit.at.pose.margin;
+      const double size = std::max(std::abs(at.pose.margin[hit.bound]),
+                                   std::abs(next.pose.margin[hit.bound]));
+      if (!(std::abs(margin[hit.bound]) < kOnBound * size)) return std::nullopt;
+      bool inside = true;
+      for (Eigen::Index j = 0; j < margin.size(); ++j) {
+        inside = inside && (j == hit.bound || margin[j] >= -kBeyond);
+      }
+      if (inside) return hit;
+      h = first;
+      next = std::move(hit.at);
     }
-    Hit hit{.at = {}, .bound = bound};
-    if (!space_.Step(at, first * along, &hit.at)) return std::nullopt;
-    return hit;
+    return std::nullopt;
   }
 
   // The pose on the bound's curve at τ along the tangent t.
@@ -474,7 +498,11 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       size = std::max(size, (x.colwise() - x_start).colwise().norm().maxCoeff());
       const Vec2 tail =
           (x * nodes.last.transpose()).cwiseAbs() + (x * nodes.one_before.transpose()).cwiseAbs();
-      failed = tail.maxCoeff() > kTail * size && h > kLeastStep;
+      // Near a crossing, where its slope vanishes, the margin's rounding moves the curve.
+      const double blur = s0 > 0.0 ? 0.0
+                                   : kRoundings * std::abs(here.at.pose.margin[here.bound]) /
+                                         (rate * h * nodes.node[1]);
+      failed = tail.maxCoeff() > kTail * size + blur && h > kLeastStep;
       if (failed) why = "it curves too much";
       if (!failed && Dips(at, here.bound)) {
         failed = true;
@@ -795,6 +823,9 @@ class SolidTracer {
       set.summary.message = lost_;
     } else {
       set.summary = RunSummary::Done();
+      for (const auto& [height, why] : gone_) {
+        if (height > set.low && height < set.high) set.gone.push_back(why);
+      }
     }
     for (auto& [height, section] : sections_) set.sections.push_back(std::move(section));
     for (const auto& [height, poses] : seeds_) {
@@ -813,9 +844,17 @@ class SolidTracer {
   struct Part {
     double a = kNan, b = kNan;
     bool ends_a = false, ends_b = false;
+    double slab = kNan;  // left out about a height whose section is lost
     double value = kNan, error = kNan;
 
     [[nodiscard]] double length() const { return b - a; }
+    // Whether a height is one of the rule's nodes.
+    [[nodiscard]] bool Has(double height) const {
+      for (size_t k = 0; k < Kronrod::abscissa().size(); ++k) {
+        if (NodeOf(k, -1.0).first == height || NodeOf(k, 1.0).first == height) return true;
+      }
+      return false;
+    }
     // A height and its rate by the rule's variable, −1 … 1.
     [[nodiscard]] std::pair<double, double> NodeOf(size_t k, double sign) const {
       const double u = 0.5 * (1.0 + sign * Kronrod::abscissa()[k]), v = 1.0 - u;
@@ -955,8 +994,11 @@ class SolidTracer {
   void Keep(Found found) {
     const double height = found.section.height;
     closings_ += found.closings;
-    if (lost_.empty()) lost_ = found.lost;
     unbounded_ = unbounded_ || found.unbounded;
+    if (!found.lost.empty()) {
+      gone_[height] = found.lost;
+      return;
+    }
     auto& poses = seeds_[height];
     poses.insert(poses.end(), found.inside.begin(), found.inside.end());
     sections_[height] = std::move(found.section);
@@ -965,18 +1007,25 @@ class SolidTracer {
     while (!changed.empty()) {
       const auto at = sections_.find(changed.back());
       changed.pop_back();
+      if (at == sections_.end()) continue;
       for (const bool up : {false, true}) {
         if (up ? std::next(at) == sections_.end() : at == sections_.begin()) continue;
         const auto other = up ? std::next(at) : std::prev(at);
         Found more = log_.Get<Found>([&] { return Extended(at->second, other->second); });
-        if (lost_.empty()) lost_ = more.lost;
+        closings_ += more.closings;
+        if (!more.lost.empty()) {  // a part of it is not known: it is gone
+          gone_[other->first] = more.lost;
+          seeds_.erase(other->first);
+          sections_.erase(other);
+          completed_ = true;
+          continue;
+        }
         if (more.section.loops.size() > other->second.loops.size()) {
           other->second = std::move(more.section);
           seeds_[other->first] = std::move(more.inside);
           changed.push_back(other->first);
           completed_ = true;
         }
-        closings_ += more.closings;
       }
     }
   }
@@ -1003,10 +1052,11 @@ class SolidTracer {
 
   double AreaAt(double height) {
     if (!lost_.empty()) return 0.0;
-    if (!sections_.contains(height)) {
+    if (!sections_.contains(height) && !gone_.contains(height)) {
       Keep(log_.Get<Found>([&] { return TraceAt(height); }));
     }
-    return sections_.at(height).area;
+    const auto at = sections_.find(height);
+    return at == sections_.end() ? kNan : at->second.area;
   }
   // All of the nodes of these parts at once.
   void PrepareNodes(const std::vector<Part>& parts) {
@@ -1022,8 +1072,9 @@ class SolidTracer {
     Prepare(heights);
   }
   // Sections at once, from what is known before.
-  void Prepare(const std::vector<double>& heights) {
-    if (!lost_.empty()) return;
+  void Prepare(std::vector<double> heights) {
+    std::erase_if(heights, [&](double h) { return sections_.contains(h) || gone_.contains(h); });
+    if (!lost_.empty() || heights.empty()) return;
     auto found = log_.Get<std::vector<Found>>([&] {
       std::vector<Found> traced(heights.size());
       std::atomic<size_t> next = 0;
@@ -1064,6 +1115,58 @@ class SolidTracer {
     return part;
   }
 
+  // Rules of parts whose sections are all there. About a height whose section is lost a slab is
+  // left out, wider where the next one is lost, too: such sections lie where the boundary changes,
+  // and areas have roots of the height there.
+  std::vector<Part> Settle(std::vector<Part> parts, const TracedSet& set) {
+    std::vector<Part> settled;
+    while (!parts.empty() && lost_.empty()) {
+      PrepareNodes(parts);
+      std::vector<Part> rest;
+      for (const Part& part : parts) {
+        const Part ruled = Rule(part);
+        if (std::isfinite(ruled.value)) {
+          settled.push_back(ruled);
+          continue;
+        }
+        const double slab =
+            std::isfinite(part.slab) ? kWider * part.slab : kSlab * (set.high - set.low);
+        const auto first = gone_.lower_bound(part.a);
+        const auto at = std::find_if(first, gone_.end(), [&](const auto& gone) {
+          return part.Has(gone.first);
+        });
+        if (at == gone_.end()) {
+          lost_ = fmt::format("sections between {:.6g} and {:.6g} have no area", part.a, part.b);
+          break;
+        }
+        const double h = at->first, low = h - slab, high = h + slab;
+        slabs_.emplace_back(std::max(part.a, low), std::min(part.b, high));
+        double width = 0.0;
+        for (const auto& [a, b] : slabs_) width += b - a;
+        if (width > kMostSlabs * (set.high - set.low)) lost_ = at->second;
+        if (low > part.a) rest.push_back({part.a, low, part.ends_a, true, slab});
+        if (high < part.b) rest.push_back({high, part.b, true, part.ends_b, slab});
+      }
+      parts = std::move(rest);
+    }
+    return settled;
+  }
+  // Volume of what was left out, and all of it as its error.
+  [[nodiscard]] double VolumeOfSlabs() const {
+    double sum = 0.0;
+    for (const auto& [a, b] : slabs_) {
+      double area = 0.0;
+      if (const auto above = sections_.lower_bound(b); above != sections_.end()) {
+        area = above->second.area;
+      }
+      if (auto below = sections_.upper_bound(a); below != sections_.begin()) {
+        area = std::max(area, std::prev(below)->second.area);
+      }
+      sum += (b - a) * area;
+    }
+    return sum;
+  }
+
   // Which bounds follow each other around a section.
   [[nodiscard]] static std::vector<std::pair<int, int>> CornersOf(const TracedSection& section) {
     std::vector<std::pair<int, int>> corners;
@@ -1098,7 +1201,8 @@ class SolidTracer {
     auto gap = GapOf(part);
     if (!gap) {
       const double middle = 0.5 * (part.a + part.b);
-      return {{part.a, middle, part.ends_a, false}, {middle, part.b, false, part.ends_b}};
+      return {{part.a, middle, part.ends_a, false, part.slab},
+              {middle, part.b, false, part.ends_b, part.slab}};
     }
     while (gap->second - gap->first > 0.1 * kSliver * part.length()) {
       const auto [low, high] = *gap;
@@ -1108,7 +1212,9 @@ class SolidTracer {
       if (!lost_.empty()) break;
       const auto from = CornersOf(sections_.at(low));
       for (const double height : heights) {
-        if (CornersOf(sections_.at(height)) != from) {
+        // One that is lost is where they change.
+        const auto section = sections_.find(height);
+        if (section == sections_.end() || CornersOf(section->second) != from) {
           gap->second = height;
           break;
         }
@@ -1116,13 +1222,12 @@ class SolidTracer {
       }
     }
     const double at = 0.5 * (gap->first + gap->second);
-    return {{part.a, at, part.ends_a, true}, {at, part.b, true, part.ends_b}};
+    return {{part.a, at, part.ends_a, true, part.slab}, {at, part.b, true, part.ends_b, part.slab}};
   }
 
   void Integrate(TracedSet* set) {
-    const Part whole{set->low, set->high};
-    std::vector<Part> parts = {Rule(whole)};
-    if (std::exchange(completed_, false)) parts = {Rule(whole)};
+    std::vector<Part> parts = Settle({Part{set->low, set->high}}, *set);
+    while (std::exchange(completed_, false)) parts = Settle(std::move(parts), *set);
     const auto sum = [&](double Part::*member) {
       double total = 0.0;
       for (const Part& part : parts) total += part.*member;
@@ -1134,15 +1239,13 @@ class SolidTracer {
       return error <= share_ * value ||
              closings_ >= (error > kRough * value ? kMostClosings : kEnoughClosings);
     };
-    while (!enough() && sections_.size() < kMostSections && lost_.empty()) {
+    while (!enough() && !parts.empty() && sections_.size() < kMostSections && lost_.empty()) {
       const auto worst = std::ranges::max_element(parts, {}, &Part::error);
       const auto [lower, upper] = Split(*worst);
-      PrepareNodes({lower, upper});
-      *worst = Rule(lower);
-      parts.push_back(Rule(upper));
-      if (std::exchange(completed_, false)) {
-        for (Part& part : parts) part = Rule(part);
-      }
+      const std::vector<Part> halves = Settle({lower, upper}, *set);
+      parts.erase(worst);
+      parts.insert(parts.end(), halves.begin(), halves.end());
+      while (std::exchange(completed_, false)) parts = Settle(std::move(parts), *set);
       if (progress_ && start > 0.0) {
         const double done = std::log(start / std::max(sum(&Part::error), 1e-300)) /
                             std::log(start / (share_ * sum(&Part::value)));
@@ -1152,8 +1255,9 @@ class SolidTracer {
         Report(kEndsShare + (1.0 - kEndsShare) * std::clamp(std::max(done, closed), 0.0, 1.0));
       }
     }
-    set->measure = sum(&Part::value);
-    set->error = sum(&Part::error);
+    const double slabs = VolumeOfSlabs();
+    set->measure = sum(&Part::value) + slabs;
+    set->error = sum(&Part::error) + slabs;
     double largest = 0.0;
     for (const auto& [height, section] : sections_) largest = std::max(largest, section.error);
     set->error += largest * (set->high - set->low);
@@ -1166,7 +1270,9 @@ class SolidTracer {
   ResultLog log_;
   std::map<double, std::vector<SpacePose>> seeds_;
   std::map<double, TracedSection> sections_;
-  std::string lost_;
+  std::map<double, std::string> gone_;             // heights without a section, and why
+  std::vector<std::pair<double, double>> slabs_;  // left out
+  std::string lost_;                               // all of it, and why
   long closings_ = 0;
   bool completed_ = false, unbounded_ = false;
 };

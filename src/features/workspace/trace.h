@@ -41,6 +41,8 @@ struct TracedSet {
   double measure = kNan, error = kNan;       ///< length, area or volume
   std::vector<TracedSection> sections;       ///< by height; of one dimension none
   std::vector<std::pair<double, int>> ends;  ///< of one dimension: coordinate, bound
+  std::vector<std::string> gone;             ///< sections without a boundary, and why; the slabs
+                                             ///< about them count as error
   std::vector<SpacePose> inside;             ///< some poses that belong to it
   double low = kNan, high = kNan;            ///< of three dimensions: the third coordinate
   long closings = 0;
@@ -64,7 +66,11 @@ template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<TracedSet>& set) {
   visit(set.summary), visit(set.measure), visit(set.error), visit(set.sections), visit(set.ends);
   visit(set.inside), visit(set.low), visit(set.high), visit(set.closings), visit(set.wall_s);
+  visit(set.gone);
 }
+
+/// Poses that a volume's boundary closes, about, before it has the error that it has.
+inline constexpr long kEnoughClosings = 1000000;
 
 /// From a home pose inside all bounds; volumes until their error is this share of them, or a
 /// million poses are closed (six, while it is above a thousandth). Nothing depends on the number of

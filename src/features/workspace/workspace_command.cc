@@ -1,6 +1,7 @@
 // mbverify workspace
 #include <fmt/format.h>
 
+#include <charconv>
 #include <memory>
 
 #include "base/json_text.h"
@@ -30,7 +31,9 @@ namespace {
 struct WorkspaceArguments {
   std::string model, out = "out";
   std::string modes;  // "drives", "output", "all"; "": a set
-  std::vector<std::string> set;
+  std::string way;    // "output=3": of modes, where the set begins
+  std::vector<std::string> set, formats;
+  std::string style = "ieee";
   bool no_pictures = false, joint_space = false, local = false;
   std::string maximise;
   std::vector<std::string> over_parameters;
@@ -99,6 +102,7 @@ std::string IdentityOf(const WorkspaceArguments& arguments, const std::vector<In
   const SetArguments& asked = arguments.set_of_poses;
   const RobotArguments& robot = arguments.options;
   Fingerprint sum;
+  sum.AddFile(ProgramFile());  // another build of the same version may find other numbers
   for (const auto& [name, version] : Versions()) sum.Add(name + " " + version);
   for (const InputFile& input : inputs) sum.Add(input.fingerprint);
   for (const auto& list :
@@ -107,8 +111,9 @@ std::string IdentityOf(const WorkspaceArguments& arguments, const std::vector<In
     sum.Add(fmt::format("{}", list.size()));
     for (const std::string& text : list) sum.Add(text);
   }
-  for (const std::string& text : {asked.output, robot.base}) sum.Add(text);
-  sum.Add(fmt::format("{} {} {} {} {} {} {}", asked.cross_singularities, asked.flood.resolution,
+  for (const std::string& text : {asked.output, robot.base, arguments.way}) sum.Add(text);
+  sum.Add(fmt::format("{} {} {} {} {} {} {} {}", asked.clearance, asked.cross_singularities,
+                      asked.flood.resolution,
                       robot.free_base, robot.closure_tolerance_m, arguments.local,
                       arguments.evaluations, arguments.seed));
   return sum.Text();
@@ -143,6 +148,38 @@ int WriteResults(const WorkspaceArguments& arguments, const std::string& mechani
   return WorseExit(agree ? 0 : 1, arguments.json.Write(json, inputs));
 }
 
+// "output=3": the set begins at that way to close.
+bool BeginAtWay(const WorkspaceArguments& arguments, const SetArguments& asked,
+                const ProgressFunction& progress, std::optional<SetQuestion>* question,
+                Diagnostics* diagnostics) {
+  const std::string where = "--way " + arguments.way;
+  const size_t equals = arguments.way.find('=');
+  const std::string same = arguments.way.substr(0, equals);
+  const std::string number = arguments.way.substr(std::min(equals, arguments.way.size() - 1) + 1);
+  size_t n = 0;
+  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), n);
+  if ((same != "drives" && same != "output") || error != std::errc() ||
+      end != number.data() + number.size() || n < 1) {
+    diagnostics->AddError(where, "a way to close is needed", "--way output=2, as --modes lists it");
+    return false;
+  }
+  const ModesOfPose found = FindModesOfPose(**question, same == "drives", same == "output",
+                                            arguments.jobs, progress, diagnostics);
+  if (diagnostics->has_errors()) return false;
+  const std::vector<AssemblyMode>& modes = found.of.front().second.modes;
+  if (n > modes.size()) {
+    diagnostics->AddError(where, fmt::format("{} ways are found", modes.size()),
+                          "--modes " + same + " lists them");
+    return false;
+  }
+  *question = ReadQuestion(WithHomeAt((*question)->mechanism, modes[n - 1]), asked, diagnostics);
+  if (*question) {
+    (*question)->notes.push_back(
+        fmt::format("home is way {} of {} for the same {}", n, modes.size(), same));
+  }
+  return question->has_value();
+}
+
 // Of any model, with the closed form's measures of the same set.
 int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
                const ProgressFunction& progress, ProgressLine* line,
@@ -150,14 +187,20 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   SetArguments asked = arguments.set_of_poses;
   asked.flood.threads = arguments.jobs;
   Diagnostics diagnostics;
-  const auto question = ReadQuestion(mechanism, asked, &diagnostics);
+  auto question = ReadQuestion(mechanism, asked, &diagnostics);
+  if (question && !arguments.way.empty()) {
+    (void)BeginAtWay(arguments, asked, progress, &question, &diagnostics);
+    line->Clear();
+  }
   SayText(stderr, diagnostics.Text());
-  if (!question) return 2;
+  if (!question || diagnostics.has_errors()) return 2;
   const auto folder = ResumeFolderOf(arguments, mechanism.name, inputs);
   if (!folder) return 2;
   SetReport report;
   report.mechanism = mechanism.name;
-  report.set = ComputeReachableSet(*question, asked, progress, folder.get());
+  report.set = ComputeReachableSet(
+      *question, asked, progress, folder.get(),
+      {.announce = [](const std::string& text) { Say(stderr, "{}\n", text); }});
   line->Clear();
   SayText(stderr, report.set.diagnostics.Text());
   if (report.set.diagnostics.has_errors()) return 2;
@@ -174,12 +217,12 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   if (FindWorkspaceForm(mechanism.name) != nullptr) {
     form = ComputeWorkspace(mechanism, false, arguments.jobs, progress);
     line->Clear();
-    report.known = KnownOf(form, *question, report.set);
+    if (arguments.way.empty()) report.known = KnownOf(form, *question, report.set);
   }
   std::FILE* to = arguments.json.text();
   SayText(to, ToText(report, {.color = WantsColor(to), .columns = TerminalColumns(to)}));
-  Files files = SetFiles(report);
-  const auto surfaces = InWorld(mechanism, question->output, ColoredSurface(report.set));
+  Files files = SetFiles(report, {arguments.formats, *FindFigureStyle(arguments.style)});
+  const auto surfaces = InWorld(question->mechanism, question->output, ColoredSurface(report.set));
   if (!arguments.no_pictures && !surfaces.empty()) {
     const RunSummary drawn =
         DrawInside(mechanism, surfaces, mechanism.name + " / reachable set", "reachable", &files);
@@ -204,6 +247,7 @@ std::string CommandOf(const WorkspaceArguments& arguments, const DesignQuestion&
   add("--from", asked.from);
   add("--range", asked.ranges);
   add("--cone", asked.cones);
+  if (std::isfinite(asked.clearance)) command += fmt::format(" --clearance {:.17g}", asked.clearance);
   add("--for-all", asked.for_all);
   add("--for-some", asked.for_some);
   if (asked.cross_singularities) command += " --cross-singularities";
@@ -232,8 +276,9 @@ int BestOfDesigns(const WorkspaceArguments& arguments, const Mechanism& mechanis
                          "a search of designs needs --maximise and --over-parameters",
                          "--maximise volume --over-parameters NAME=LOW:HIGH");
   }
-  if (arguments.joint_space || !arguments.modes.empty()) {
-    diagnostics.AddError("--maximise", "it asks for another thing than --modes and --joint-space",
+  if (arguments.joint_space || !arguments.modes.empty() || !arguments.way.empty()) {
+    diagnostics.AddError("--maximise",
+                         "it asks for another thing than --modes, --joint-space and --way",
                          "leave them out");
   }
   (void)ReadQuestion(mechanism, asked, &diagnostics);
@@ -280,10 +325,11 @@ int WaysToClose(const WorkspaceArguments& arguments, const Mechanism& mechanism,
                 const std::vector<InputFile>& inputs) {
   Diagnostics diagnostics;
   const auto question = ReadQuestion(mechanism, arguments.set_of_poses, &diagnostics);
-  if (arguments.set_of_poses.any_of_set() || (arguments.joint_space && !arguments.modes.empty())) {
+  if (arguments.set_of_poses.any_of_set() || !arguments.way.empty() ||
+      (arguments.joint_space && !arguments.modes.empty())) {
     diagnostics.AddError(arguments.joint_space ? "--joint-space" : "--modes",
                          "it asks for another thing than a set of poses",
-                         "leave out --resolution, --cone, --cross-singularities and the other one "
+                         "leave out --resolution, --cone, --clearance, --cross-singularities, --way and the other one "
                          "of --modes and --joint-space");
   }
   nlohmann::ordered_json json = OutcomeJson(mechanism.name, true, {});
@@ -338,7 +384,8 @@ int Workspace(const WorkspaceArguments& arguments) {
   if (!arguments.modes.empty() || arguments.joint_space) {
     return WaysToClose(arguments, mechanism, progress, &line, inputs.files());
   }
-  if (arguments.set_of_poses.any() || FindWorkspaceForm(mechanism.name) == nullptr) {
+  if (arguments.set_of_poses.any() || !arguments.way.empty() ||
+      FindWorkspaceForm(mechanism.name) == nullptr) {
     return SetOfPoses(arguments, mechanism, progress, &line, inputs.files());
   }
   const WorkspaceOutcome outcome =
@@ -371,7 +418,8 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   const auto list = [&](const char* name, std::vector<std::string>* values, const char* text) {
     workspace->add_option(name, *values, text)->delimiter(',')->allow_extra_args(false);
   };
-  workspace->add_option("--output", asked.output, "whose poses are asked (default: the first)");
+  workspace->add_option("--output", asked.output,
+                        "whose poses are asked: an output (default: the first), a body or a frame");
   list("--over", &asked.over,
        "one to three coordinates that are free: x,y,z,roll,pitch,yaw of the output, drives, "
        "joints; x_mm=-100:100 within a box (repeatable)");
@@ -384,6 +432,11 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   list("--range", &asked.ranges, "NAME=LOW:HIGH of a drive or joint, instead of the model's");
   list("--cone", &asked.cones,
        "JOINT_deg=ANGLE: the joint's axis z (or JOINT.x_deg, JOINT.y_deg) stays within it");
+  workspace
+      ->add_option("--clearance", asked.clearance,
+                   "METRES: poses end where the shapes of two bodies that no joint connects come "
+                   "as near as this")
+      ->check(CLI::PositiveNumber);
   workspace->add_flag("--cross-singularities", asked.cross_singularities,
                       "poses where the drives lose their hold (type 2) end nothing");
   workspace
@@ -391,6 +444,9 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
                    "instead of a set: in how many ways the pose's drives can be had (drives: "
                    "assembly modes), or its coordinates (output: working modes), or both (all)")
       ->check(CLI::IsMember({"drives", "output", "all"}));
+  workspace->add_option("--way", arguments->way,
+                        "drives=N or output=N: the set of another assembly or working mode, as "
+                        "--modes lists them");
   workspace->add_flag("--joint-space", arguments->joint_space,
                       "instead of a set: type-2 curves over the two drives of --over, the others "
                       "held, with their cusps");
@@ -420,6 +476,16 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   arguments->json.AddTo(workspace);
+  workspace->add_option("--formats", arguments->formats,
+                        "pdf, png: figures of a set for print, beside their SVG")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"pdf", "png"}));
+  std::vector<std::string> styles;
+  for (const FigureStyle& style : FigureStyles()) styles.push_back(style.name);
+  workspace->add_option("--style", arguments->style, "of figures for print")
+      ->check(CLI::IsMember(styles))
+      ->capture_default_str();
   workspace->add_flag("--no-pictures", arguments->no_pictures, "data files only");
   SetFooter(workspace,
             {"workspace spr_tripod --set q_min=0.45 --set q_max=0.65",

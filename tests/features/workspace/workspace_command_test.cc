@@ -76,6 +76,22 @@ TEST_F(WorkspaceCommand, WaysToCloseAndTypeTwoCurvesAreListed) {
   EXPECT_THAT(ReadAll(folder / "joint_space.csv"), HasSubstr("curve,motor1_rad,motor2_rad"));
 }
 
+TEST_F(WorkspaceCommand, AnotherWayToCloseAndFiguresForPrint) {
+  const std::string asked = "friction_five_bar --over x,y --resolution 30 --formats pdf,png --json - ";
+  const ProgramResult home = Call(asked), other = Call(asked + "--way output=2");
+  ASSERT_EQ(other.exit_code, 0) << other.err;
+  const auto set = nlohmann::json::parse(other.out)["set"];
+  EXPECT_EQ(set["notes"].dump().find("home is way 2 of 4 for the same output") == std::string::npos,
+            false);
+  // The elbows are on other sides: type 2 ends it elsewhere.
+  EXPECT_GT(std::abs(set["traced"]["value"].get<double>() -
+                     nlohmann::json::parse(home.out)["set"]["traced"]["value"].get<double>()),
+            0.01);
+  const std::filesystem::path folder = mbverify.folder() / "out/friction_five_bar/workspace";
+  EXPECT_TRUE(ReadAll(folder / "quality_condition.pdf").starts_with("%PDF"));
+  EXPECT_TRUE(ReadAll(folder / "reachable_boundary.png").starts_with("\x89PNG"));
+}
+
 TEST_F(WorkspaceCommand, ARangeOfOrientationsIsAskedForAllOrForSome) {
   const std::string asked = "spr_tripod --over x --at y=0 --resolution 100 --json - ";
   std::vector<double> lengths;
@@ -101,6 +117,8 @@ TEST_F(WorkspaceCommand, BadInputIsRefusedWithExitCode2) {
            {"friction_five_bar --resolution 90000", "takes about"},
            {"friction_five_bar --joint-space --over x,y", "two drives are needed"},
            {"stewart --modes drives --resolution 40", "another thing than a set"},
+           {"friction_five_bar --over x,y --way output=9", "4 ways are found"},
+           {"friction_five_bar --over x,y --way elbow", "a way to close is needed"},
            {"spring_cart --modes drives", "1 drives do not determine 2 degrees of freedom"},
            {"four_bar --base crank", "robot"}}) {
     const ProgramResult result = Call(arguments);
