@@ -1,5 +1,6 @@
 #include "tests/laws/similar.h"
 
+#include <cmath>
 #include <type_traits>
 
 namespace mbv::laws {
@@ -106,6 +107,21 @@ void Scale(const Mechanism& mechanism, double s, ForceElement* element) {
     friction->breakaway *= force;
     friction->stribeck_rate *= unit;
     if (!length) friction->radius *= s;  // coefficients have no unit
+    friction->length *= s;
+    friction->thrust_radius *= s;
+  }
+  if (auto* stop = std::get_if<StopLaw>(&element->law)) {
+    stop->lower *= unit;
+    stop->upper *= unit;
+    stop->stiffness *= force / std::pow(unit, stop->exponent);
+    stop->damping *= force / unit;
+    stop->dissipation /= unit;
+  }
+  if (auto* curve = std::get_if<CurveLaw>(&element->law)) {
+    for (CurveLaw::Knot& knot : curve->knots) {
+      knot = {knot.at * unit, knot.force * force, knot.slope_before * force / unit,
+              knot.slope_after * force / unit};
+    }
   }
   if (auto* rotor = std::get_if<RotorLaw>(&element->law)) rotor->inertia *= force / unit;
   auto* spring = std::get_if<SpringLaw>(&element->law);

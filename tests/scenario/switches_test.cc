@@ -31,7 +31,9 @@ TEST_F(SwitchesTest, ForcesJumpWhereTheyAreStated) {
       "switches: {brake: {step: {at_s: 0.7, height: 1}}}\n");
   ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
   const Motion& motion = result.scenario->motion;
-  EXPECT_EQ(JumpTimes(motion), (std::vector<double>{0.5, 0.7, 1.0, 1.1, 1.3, 1.4}));
+  const std::vector<double> jumps = JumpTimes(motion), stated = {0.5, 0.7, 1.0, 1.1, 1.3, 1.4};
+  ASSERT_EQ(jumps.size(), stated.size());
+  for (size_t i = 0; i < jumps.size(); ++i) EXPECT_DOUBLE_EQ(jumps[i], stated[i]);
   const Profile& force = motion.forces[0].force;
   EXPECT_DOUBLE_EQ(Evaluate(force, 0.3).value, 0.4);  // ramp
   EXPECT_DOUBLE_EQ(Evaluate(force, 0.49).value, 1.0);

@@ -710,7 +710,7 @@ class Prover {
   };
   using Bearings = std::array<exact::Vector<T>, 3>;
   static double LargestRadius(const FrictionLaw& law) {
-    return std::max(law.radius, law.thrust_radius);
+    return law.coupling >= 0 ? 1.0 : std::max(law.radius, law.thrust_radius);
   }
   static T PerLoad(const FrictionLaw& law) {
     return T(law.coefficient) * T(LargestRadius(law));
@@ -780,6 +780,26 @@ class Prover {
     }
     return "";
   }
+  // λ dP/dq along the element's coordinate of the coupling whose force it follows; couplings are the
+  // last of what transmits.
+  [[nodiscard]] T CouplingForce(size_t e, const std::vector<T>& forces) const {
+    const ForceElement& element = mechanism().elements[e];
+    const auto c = static_cast<size_t>(std::get<FrictionLaw>(element.law).coupling);
+    const T q = model_.ValueAt(element_equations_[e], bodies_);
+    T slope(0);
+    for (const Coupling::Term& term : mechanism().couplings[c].terms) {
+      if (term.joint != element.joint || term.coordinate != element.coordinate) continue;
+      for (size_t i = term.polynomial.size(); i-- > 0;) {
+        slope = slope * q + T(static_cast<double>(i + 1)) * T(term.polynomial[i]);
+      }
+    }
+    return slope * forces[transmitting_ - mechanism().couplings.size() + c];
+  }
+
+  static Bearings Nothing() {
+    const exact::Vector<T> none{{T(0), T(0), T(0)}};
+    return {none, none, none};
+  }
   // Parts that are zero by how the joint is made have no slope.
   static T Norm(const Bearings& load) {
     T sum(0);
@@ -797,13 +817,17 @@ class Prover {
     for (size_t k = 0; k < columns_.size(); ++k) all[columns_[k]] = forces[k];
     const ForceElement& element = mechanism().elements[e];
     const auto& law = std::get<FrictionLaw>(element.law);
+    if (law.coupling >= 0) {
+      Bearings force = Nothing();
+      force[2][0] = CouplingForce(e, all);
+      return force;
+    }
     const auto j = static_cast<size_t>(element.joint);
     const Joint& joint = mechanism().joints[j];
     const std::array<T, 6> bears = model_.InJoint(joint, ReactionsOf(carried, all)[j], bodies_);
     const exact::Vector<T> f{{bears[0], bears[1], bears[2]}}, m{{bears[3], bears[4], bears[5]}};
     const T largest(LargestRadius(law)), radial = T(law.radius) / largest;
-    Bearings load{exact::Vector<T>{{T(0), T(0), T(0)}}, exact::Vector<T>{{T(0), T(0), T(0)}},
-                  exact::Vector<T>{{T(0), T(0), T(0)}}};
+    Bearings load = Nothing();
     if (IsOfBall(joint.kind, element.coordinate)) {
       load[0] = exact::Times(radial, f);
       return load;
@@ -1083,9 +1107,6 @@ class Prover {
           size += (T(friction->breakaway) - T(friction->coulomb)) * exp(T(-slowness * slowness));
         }
         force = T(-sign) * share * size;
-        if (friction->coupling >= 0) {
-          return fmt::format("not provable: '{}' follows the force of a coupling", element.name);
-        }
         if (friction->by_load()) {
           loaded_.push_back({e, T(-sign) * share * PerLoad(*friction), wrenches});
         }

@@ -138,7 +138,7 @@ TEST(GatherInputs, AllFindingsAreGivenAtOnce) {
   const std::string model = folder.Write("model.yaml", "name: x\n");
   Diagnostics diagnostics;
   EXPECT_FALSE(GatherInputs({model, folder.PathOf("nowhere.yaml")}, &diagnostics));
-  EXPECT_NE(diagnostics.Text().find("is neither a scenario nor a study"), std::string::npos);
+  EXPECT_NE(diagnostics.Text().find("is neither a scenario, a study nor"), std::string::npos);
   EXPECT_NE(diagnostics.Text().find("nowhere.yaml"), std::string::npos);
 }
 

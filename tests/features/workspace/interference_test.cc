@@ -34,7 +34,7 @@ TEST(Interference, GapsAreThoseByHand) {
   turned.rotate(Eigen::AngleAxisd(pi / 4, Vec3::UnitZ()));
   EXPECT_NEAR(GapOf(box, here, box, turned), 0.4 - 0.1 * std::sqrt(2.0), 1e-15);
   turned.translation() = Vec3(0.01, 0.02, 0);
-  EXPECT_EQ(GapOf(box, here, box, turned), 0.0);  // they overlap
+  EXPECT_NEAR(GapOf(box, here, box, turned), 0.0, 1e-15);  // they overlap
   // A segment's middle as a third point of it: hulls instead of the closed form.
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
