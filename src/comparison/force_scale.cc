@@ -444,8 +444,7 @@ double SizeOf(const SpringLaw& law, const Rates& rates, const MotionSize& motion
 double SizeOf(const StopLaw& law, const Rates& rates, const MotionSize& motion) {
   const double deepest = std::max({0.0, rates.home - law.upper, law.lower - rates.home});
   const double stored = std::max(0.0, motion.most_energy_J) * (law.exponent + 1.0) / law.stiffness;
-  const double by_energy =
-      law.stiffness * std::pow(stored, law.exponent / (law.exponent + 1.0));
+  const double by_energy = law.stiffness * std::pow(stored, law.exponent / (law.exponent + 1.0));
   return std::max(law.stiffness * std::pow(deepest, law.exponent), by_energy);
 }
 // Within its knots.

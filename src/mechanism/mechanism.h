@@ -357,11 +357,12 @@ struct RotorLaw {
 
 /// Dry friction: force −(Fc + (Fs − Fc) exp(−(q̇/vs)²) + S) sign q̇, S by what the joint bears
 /// [Armstrong-Hélouvry 1991]; viscous friction beside it is damping. At rest the force lies
-/// anywhere in ±(Fs + S), and with it drive forces within a band. With F the joint's reaction force,
-/// F_n its part across the axis a, M its moment about M's origin,
+/// anywhere in ±(Fs + S), and with it drive forces within a band. With F the joint's reaction
+/// force, F_n its part across the axis a, M its moment about M's origin,
 ///   S = μ (r |F_n| + r_t |a·F|),  with two bearings at ±ℓ/2 along a, which share F_n and M,
 ///   S = μ (r |F_n/2 + M × a/ℓ| + r |F_n/2 − M × a/ℓ| + r_t |a·F|);                            (1)
-/// of a ball S = μ r |F| about each axis; of a coupling S = μ |Q|, Q its force along the coordinate.
+/// of a ball S = μ r |F| about each axis; of a coupling S = μ |Q|, Q its force along the
+/// coordinate.
 struct FrictionLaw {
   double coulomb = 0.0;        ///< Fc [N or N m], >= 0
   double breakaway = 0.0;      ///< Fs, >= Fc
@@ -381,8 +382,8 @@ struct FrictionLaw {
 
 /// What acts beyond the ends of a way, and pushes back only: with the depth δ = q − upper (or lower
 /// − q), e = k δⁿ and either damping c or dissipation a
-///   N = e + c δ̇, c δ̇ within ±e [Modelica Standard Library, ElastoGap],                          (1)
-///   N = e (1 + a δ̇), at least 0 [Hunt, Crossley 1975, eq. 2];  F = −N beyond upper, N below lower
+///   N = e + c δ̇, c δ̇ within ±e [Modelica Standard Library, ElastoGap], (1) N = e (1 + a δ̇), at
+///   least 0 [Hunt, Crossley 1975, eq. 2];  F = −N beyond upper, N below lower
 struct StopLaw {
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();  ///< at least one is finite
@@ -438,8 +439,8 @@ struct Contact {
 [[nodiscard]] const char* WordOf(Contact::Kind kind);
 
 /// What acts along one scalar coordinate q of a joint or a bushing or along the length q of a
-/// distance drive or a spring; its force is positive as a drive's there, exerted by the joint's parent on its
-/// child. Parts of the reactions are these forces no more than drive forces are.
+/// distance drive or a spring; its force is positive as a drive's there, exerted by the joint's
+/// parent on its child. Parts of the reactions are these forces no more than drive forces are.
 ///
 /// A ball's rotation has no coordinates to act along: its three elements, of one law, have the
 /// relative angular velocity about M's axes as rates (ActsOnBall()), and no position. With ω_FM of

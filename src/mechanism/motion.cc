@@ -255,9 +255,8 @@ void UntilJump::StartFrom(double from_s) {
 }
 
 bool UntilJump::IsJump(double t_s) const {
-  return std::ranges::any_of(jumps_s_, [t_s](double at_s) {
-    return BeforeJump(at_s) < t_s && BeforeJump(t_s) < at_s;
-  });
+  return std::ranges::any_of(
+      jumps_s_, [t_s](double at_s) { return BeforeJump(at_s) < t_s && BeforeJump(t_s) < at_s; });
 }
 
 void BodyStates::Resize(size_t bodies) {

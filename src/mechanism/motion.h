@@ -115,9 +115,10 @@ struct DriveForce {
 
 /// A force element that acts with a share of its force: a brake or clutch that is switched.
 struct Switch {
-  std::string name;   ///< of the element, or of a ball's three
-  size_t element = 0; ///< index into Mechanism::elements; with dry friction, or a curve of the rate
-  Profile share;      ///< >= 0
+  std::string name;  ///< of the element, or of a ball's three
+  size_t element =
+      0;          ///< index into Mechanism::elements; with dry friction, or a curve of the rate
+  Profile share;  ///< >= 0
 };
 
 /// Where a DOF starts that moves by forces.
@@ -159,7 +160,7 @@ struct Motion {
   double sample_s = 0.01;
   std::vector<Command> commands;
   std::vector<Load> loads;
-  std::vector<DriveForce> forces = {};     ///< free motion only; no drive is commanded and forced
+  std::vector<DriveForce> forces = {};  ///< free motion only; no drive is commanded and forced
   std::vector<Switch> switches = {};
   std::vector<InitialValue> initial = {};  ///< one per DOF that no command holds
   std::vector<MotionTable> tables = {};    ///< those that profiles above were made of
@@ -209,7 +210,8 @@ struct DrivenSample {
 [[nodiscard]] std::vector<double> BreakTimes(const Motion& motion);
 /// Those of them at which forces jump (JumpTimes() of profiles).
 [[nodiscard]] std::vector<double> JumpTimes(const Motion& motion);
-/// Elements that are switched off from one time to another, increasing: they neither hold nor slide.
+/// Elements that are switched off from one time to another, increasing: they neither hold nor
+/// slide.
 [[nodiscard]] std::vector<size_t> SwitchedOff(const Motion& motion, double from_s, double to_s);
 /// What is to be evaluated at t on the way to the next jump after `from_s`: t, or, at that jump, a
 /// time before it.

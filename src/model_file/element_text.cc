@@ -71,7 +71,8 @@ std::string ElementText(const ForceElement& element, const std::string& place, b
   const auto* friction = std::get_if<FrictionLaw>(&element.law);
   std::string bearings;
   if (friction != nullptr && friction->by_load() && friction->coupling < 0) {
-    if (!slides && friction->radius > 0.0) bearings += fmt::format(", radius: {}", friction->radius);
+    if (!slides && friction->radius > 0.0)
+      bearings += fmt::format(", radius: {}", friction->radius);
     if (std::isfinite(friction->length)) bearings += fmt::format(", length: {}", friction->length);
     if (friction->thrust_radius > 0.0) {
       bearings += fmt::format(", thrust_radius: {}", friction->thrust_radius);

@@ -693,14 +693,13 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   internal::OrderDrives(root, &yaml, &s.drives);
   internal::ReadSymbols(root, &yaml, &s.drives);
   ReadMotors(blocks.model(), &yaml, &s);
-  internal::ElementReader elements(
-      &values,
-      {.names = names,
-       .joints = s.joints,
-       .drives = s.drives,
-       .couplings = s.couplings,
-       .springs = s.springs},
-      &s.bushings, &s.elements);
+  internal::ElementReader elements(&values,
+                                   {.names = names,
+                                    .joints = s.joints,
+                                    .drives = s.drives,
+                                    .couplings = s.couplings,
+                                    .springs = s.springs},
+                                   &s.bushings, &s.elements);
   each_block([&](const Block& block) { elements.Read(block); });
   s.signals.Check(&yaml);
   internal::CheckDrivenOnce(s.drives, s.prescribed, s.joints.joints, s.signals, &yaml);

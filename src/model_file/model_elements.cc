@@ -13,8 +13,8 @@
 namespace mbv::internal {
 namespace {
 
-const std::vector<std::string> kKinds = {"damping",  "spring", "rotor", "friction",
-                                         "stop",     "curve",  "bushing"};
+const std::vector<std::string> kKinds = {"damping", "spring", "rotor",  "friction",
+                                         "stop",    "curve",  "bushing"};
 
 // The keys of a kind beside those of its place.
 const std::vector<std::string>& KeysOf(const std::string& kind) {
@@ -32,7 +32,8 @@ const std::vector<std::string>& KeysOf(const std::string& kind) {
        {"of", "points", "points_deg", "points_mm", "points_rpm", "interpolation", "beyond",
         "slopes"}},
       {"bushing", {"parent", "child", "stiffness", "damping"}},
-      {"friction", {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius", "radius_mm", "length",
+      {"friction",
+       {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius", "radius_mm", "length",
         "length_mm", "thrust_radius", "thrust_radius_mm", "coupling", "efficiency"}}};
   return keys.at(kind);
 }
@@ -264,11 +265,10 @@ std::optional<StopLaw> ElementReader::ReadStop(const Block& block, const YamlMap
   bool good = true;
   const auto end = [&](const char* key, double* limit) {
     if (map.FindInUnit(key, {kPlain, kDeg, kMm}).node == nullptr) return false;
-    const auto at =
-        element == nullptr
-            ? std::optional(0.0)
-            : ReadInCoordinateUnit(&values_, block, map, key, IsAlongLength(*element),
-                                   NameOf(*element));
+    const auto at = element == nullptr
+                        ? std::optional(0.0)
+                        : ReadInCoordinateUnit(&values_, block, map, key, IsAlongLength(*element),
+                                               NameOf(*element));
     good = good && at.has_value();
     *limit = at.value_or(kNan);
     return true;
@@ -291,16 +291,17 @@ std::optional<StopLaw> ElementReader::ReadStop(const Block& block, const YamlMap
   const auto exponent =
       map.Has("exponent") ? values_.Number(block, map, "exponent", {kPlain}) : 1.0;
   if (exponent && !(*exponent >= 1.0)) {
-    yaml.Error(*map.Find("exponent"), fmt::format("{} = {} violates exponent >= 1",
-                                                  map.PathOf("exponent"), *exponent));
+    yaml.Error(*map.Find("exponent"),
+               fmt::format("{} = {} violates exponent >= 1", map.PathOf("exponent"), *exponent));
     good = false;
   }
   const bool damps = map.FindInUnit("damping", {kPlain, kPerMm, kPerDeg}).node != nullptr;
   const auto damping = damps ? Slope(block, map, "damping", element) : 0.0;
   const auto dissipation = map.Has("dissipation") ? NotNegative(block, map, "dissipation") : 0.0;
   if (damps && map.Has("dissipation")) {
-    yaml.Error(*map.node(), fmt::format("{} has both damping and dissipation", map.path()),
-               "damping: c of c times the rate; dissipation: a of k depth^n (1 + a times the rate)");
+    yaml.Error(
+        *map.node(), fmt::format("{} has both damping and dissipation", map.path()),
+        "damping: c of c times the rate; dissipation: a of k depth^n (1 + a times the rate)");
     good = false;
   }
   if (!good || !stiffness || !exponent || !damping || !dissipation) return std::nullopt;
@@ -345,8 +346,10 @@ void MakeMonotone(std::vector<CurveLaw::Knot>* knots) {
 }  // namespace
 
 // Pairs [a, b], the first in a unit, increasing; at least two.
-std::optional<std::vector<std::array<double, 2>>> ElementReader::ReadPairs(
-    const Block& block, const YamlNode& node, const std::string& path, const UnitSuffix& unit) {
+std::optional<std::vector<std::array<double, 2>>> ElementReader::ReadPairs(const Block& block,
+                                                                           const YamlNode& node,
+                                                                           const std::string& path,
+                                                                           const UnitSuffix& unit) {
   YamlReader& yaml = values_.yaml();
   const auto items = yaml.Items(node, path);
   if (!items) return std::nullopt;
@@ -379,10 +382,10 @@ std::optional<CurveLaw> ElementReader::ReadCurve(const Block& block, const YamlM
     return std::nullopt;
   }
   const std::string path = map.PathOf(found.key);
-  const bool fits = element == nullptr ||
-                    (found.unit.suffix == kRpm.suffix
-                         ? curve.of_rate && !IsAlongLength(*element)
-                         : found.unit.Suits(IsAlongLength(*element) ? "m" : "rad"));
+  const bool fits =
+      element == nullptr ||
+      (found.unit.suffix == kRpm.suffix ? curve.of_rate && !IsAlongLength(*element)
+                                        : found.unit.Suits(IsAlongLength(*element) ? "m" : "rad"));
   if (!fits) {
     yaml.Error(*found.node, fmt::format("{}: the {} of '{}' is not in that unit", path,
                                         curve.of_rate ? "rate" : "coordinate", NameOf(*element)));
@@ -392,8 +395,8 @@ std::optional<CurveLaw> ElementReader::ReadCurve(const Block& block, const YamlM
   if (!points) return std::nullopt;
   for (size_t i = 0; i < points->size(); ++i) {
     if (i > 0 && !((*points)[i][0] > curve.knots.back().at)) {
-      yaml.Error(*found.node, fmt::format("{}[{}] = {} violates: increasing", path, i,
-                                          (*points)[i][0]));
+      yaml.Error(*found.node,
+                 fmt::format("{}[{}] = {} violates: increasing", path, i, (*points)[i][0]));
       return std::nullopt;
     }
     curve.knots.push_back({.at = (*points)[i][0], .force = (*points)[i][1]});
@@ -427,17 +430,15 @@ bool ElementReader::ReadSlopes(const Block& block, const YamlMap& map, CurveLaw*
   }
   const YamlNode *way = map.Find("interpolation"), *beyond = map.Required("beyond");
   const auto interpolation =
-      way == nullptr
-          ? std::optional<int>(0)
-          : yaml.Choice(*way, map.PathOf("interpolation"), {"monotone", "linear"});
+      way == nullptr ? std::optional<int>(0)
+                     : yaml.Choice(*way, map.PathOf("interpolation"), {"monotone", "linear"});
   const auto outside = beyond == nullptr
                            ? std::optional<int>()
                            : yaml.Choice(*beyond, map.PathOf("beyond"), {"held", "linear"});
   if (!interpolation || !outside) return false;
   MakeMonotone(&knots);
   for (size_t i = 1; i < knots.size() && *interpolation == 1; ++i) {
-    const double secant =
-        (knots[i].force - knots[i - 1].force) / (knots[i].at - knots[i - 1].at);
+    const double secant = (knots[i].force - knots[i - 1].force) / (knots[i].at - knots[i - 1].at);
     knots[i - 1].slope_after = knots[i].slope_before = secant;
   }
   const bool straight = *outside == 1;
@@ -488,8 +489,8 @@ std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlM
                      ? std::nullopt
                      : values_.Number(block, *found.node, map.PathOf(found.key), found.unit);
   if (inertia && *inertia < 0.0) {
-    values_.yaml().Error(*found.node, fmt::format("{} = {} violates inertia >= 0",
-                                                  map.PathOf(found.key), *inertia));
+    values_.yaml().Error(
+        *found.node, fmt::format("{} = {} violates inertia >= 0", map.PathOf(found.key), *inertia));
     inertia.reset();
   }
   std::optional<double> ratio = 1.0;
@@ -538,18 +539,19 @@ bool ElementReader::ReadGearLoss(const Block& block, const YamlMap& map,
   if (law->coupling < 0) {
     std::vector<std::string> names;
     for (const Coupling& coupling : couplings_) names.push_back(coupling.name);
-    yaml.Error(*node,
-               fmt::format("{} = {}: there is no such coupling", map.PathOf("coupling"),
-                           Describe(*node)),
-               DidYouMean(*name, names));
+    yaml.Error(
+        *node,
+        fmt::format("{} = {}: there is no such coupling", map.PathOf("coupling"), Describe(*node)),
+        DidYouMean(*name, names));
     return false;
   }
   const auto& terms = couplings_[static_cast<size_t>(law->coupling)].terms;
   if (std::ranges::none_of(terms, [&](const Coupling::Term& term) {
         return term.joint == element.joint && term.coordinate == element.coordinate;
       })) {
-    yaml.Error(*node, fmt::format("{} = {} does not couple the coordinate of '{}'",
-                                  map.PathOf("coupling"), *name, NameOf(element)),
+    yaml.Error(*node,
+               fmt::format("{} = {} does not couple the coordinate of '{}'", map.PathOf("coupling"),
+                           *name, NameOf(element)),
                "joint: one of those that it couples");
     return false;
   }
@@ -611,9 +613,9 @@ bool ElementReader::ReadBearings(const Block& block, const YamlMap& map,
   if (strange) return false;
   if (!loaded) return true;
   const auto coefficient = NotNegative(block, map, "coefficient");
-  const bool rubs = map.FindInUnit("radius", {kPlain, kMm}).node != nullptr;
+  const bool has_radius = map.FindInUnit("radius", {kPlain, kMm}).node != nullptr;
   const bool thrust = map.FindInUnit("thrust_radius", {kPlain, kMm}).node != nullptr;
-  if (!slides && !rubs && !thrust) {
+  if (!slides && !has_radius && !thrust) {
     yaml.Error(*map.node(), fmt::format("{} needs a radius", map.path()),
                "radius: of the journal or ball of a joint whose friction is coefficient times "
                "radius times its load");
@@ -622,7 +624,7 @@ bool ElementReader::ReadBearings(const Block& block, const YamlMap& map,
   const auto positive = [&](const char* key, bool stated, double otherwise) {
     return stated ? values_.Positive(block, map, key, {kPlain, kMm}) : std::optional(otherwise);
   };
-  const auto radius = positive("radius", rubs, slides ? 1.0 : 0.0);
+  const auto radius = positive("radius", has_radius, slides ? 1.0 : 0.0);
   const auto thrust_radius = positive("thrust_radius", thrust, 0.0);
   const auto length = positive("length", map.FindInUnit("length", {kPlain, kMm}).node != nullptr,
                                std::numeric_limits<double>::infinity());

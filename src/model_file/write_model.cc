@@ -283,10 +283,10 @@ class ModelWriter {
     for (size_t b = 0; b < m_.bushings.size(); ++b) text += Written(b, &taken);
     for (const ForceElement& element : m_.elements) {
       if (element.bushing >= 0 || IsFurtherOfBall(m_, element)) continue;
-      text += fmt::format(
-          "  {}: {{{}}}\n", FreshName(FileName(m_, element), &taken),
-          ElementText(element, PlaceOf(element) + Carrier(element) + Geared(element),
-                      ActsOnLength(m_, element)));
+      text +=
+          fmt::format("  {}: {{{}}}\n", FreshName(FileName(m_, element), &taken),
+                      ElementText(element, PlaceOf(element) + Carrier(element) + Geared(element),
+                                  ActsOnLength(m_, element)));
     }
     if (!m_.springs.empty()) text += "springs:\n";
     for (const SpringDamper& s : m_.springs) {

@@ -102,8 +102,8 @@ class ForceVariations {
     double slope = 0.0;     ///< s c
     double load = 0.0;      ///< n
     BearingLoad direction;  ///< dn/dp
-    VecX unit;            ///< forces with Gᵀ x = g
-    bool shared = false;  ///< redundant constraints share the load
+    VecX unit;              ///< forces with Gᵀ x = g
+    bool shared = false;    ///< redundant constraints share the load
   };
   /// Reactions in which self-stresses have no share, and get none along a coordinate.
   void FindUnique(const BodyStates& states, const std::vector<RowSet>& varied,

@@ -82,9 +82,10 @@ OnCurve Between(const CurveLaw::Knot& a, const CurveLaw::Knot& b, double x) {
           .slope = (6.0 * rise * (t - t2) + left * (1.0 - 4.0 * t + 3.0 * t2) +
                     right * (3.0 * t2 - 2.0 * t)) /
                    h,
-          .integral = h * t * (a.force + rise * t2 * (1.0 - 0.5 * t) +
-                               left * t * (0.5 - t * (2.0 / 3.0 - 0.25 * t)) +
-                               right * t2 * (0.25 * t - 1.0 / 3.0))};
+          .integral = h * t *
+                      (a.force + rise * t2 * (1.0 - 0.5 * t) +
+                       left * t * (0.5 - t * (2.0 / 3.0 - 0.25 * t)) +
+                       right * t2 * (0.25 * t - 1.0 / 3.0))};
 }
 OnCurve Straight(const CurveLaw::Knot& from, double slope, double x) {
   const double beyond = x - from.at;
@@ -189,9 +190,8 @@ void ForElements(const Mechanism& mechanism, const BodyStates& states,
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
     const ScalarRow row = ElementRow(mechanism, e, states);
-    const AlongElement at =
-        MotionOf(element, row, states, friction_signs.empty() ? 0 : friction_signs[e],
-                 states.Engaged(e));
+    const AlongElement at = MotionOf(
+        element, row, states, friction_signs.empty() ? 0 : friction_signs[e], states.Engaged(e));
     std::visit([&](const auto& law) { visit(law, row, at); }, element.law);
   }
 }

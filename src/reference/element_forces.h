@@ -79,8 +79,8 @@ struct ElementSlope {
 /// Indices of the elements with friction by load.
 [[nodiscard]] std::vector<size_t> LoadedElements(const Mechanism& mechanism);
 
-/// What bears, in F's axes: the load of one bearing, that of the other, and the thrust, each as it
-/// rubs at the larger of their radii; or a coupling's force [N or N m].
+/// What bears, in F's axes: the load of one bearing, that of the other, and the thrust, each times
+/// its radius by the larger of both; or a coupling's force [N or N m].
 using BearingLoad = Eigen::Matrix<double, 9, 1>;
 /// Of an element, from FillReactions(). Linear in `reactions`.
 [[nodiscard]] BearingLoad LoadOf(const Mechanism& mechanism, size_t element,

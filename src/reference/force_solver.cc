@@ -390,7 +390,8 @@ RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample) {
   for (const size_t e : loaded) {
     std::vector<BearingLoad>& row = system.P.emplace_back();
     for (Eigen::Index d = 0; d < unit.cols(); ++d) {
-      row.push_back(LoadOf(mechanism_, e, sample->states, ReactionsOf(unit.col(d), sample->states)));
+      row.push_back(
+          LoadOf(mechanism_, e, sample->states, ReactionsOf(unit.col(d), sample->states)));
     }
   }
   VecX n;

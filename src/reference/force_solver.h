@@ -106,8 +106,9 @@ class ForceSolver {
 /// Rows of all joints, with the isostatic rule applied, then of all couplings: what they can
 /// transmit.
 void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* rows);
-/// joints × 6 as ReactionChannels() defines, then a row per coupling that begins with its force, from
-/// the forces of AddReactionRows(), which come first in `rows` and `force`; returns their number.
+/// joints × 6 as ReactionChannels() defines, then a row per coupling that begins with its force,
+/// from the forces of AddReactionRows(), which come first in `rows` and `force`; returns their
+/// number.
 int FillReactions(const Mechanism& mechanism, const BodyStates& states, const RowSet& rows,
                   const VecX& force, MatX* reactions);
 

@@ -275,10 +275,10 @@ void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const Mat
   rest_.most.resize(held.gaps.size());
   for (size_t k = 0; k < phase_.held.size(); ++k) {
     // Where it holds nothing, any force moves it.
-    rest_.most[static_cast<Eigen::Index>(k)] = std::max(
-        states.Engaged(phase_.held[k]) *
-            std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway,
-        std::numeric_limits<double>::min());
+    rest_.most[static_cast<Eigen::Index>(k)] =
+        std::max(states.Engaged(phase_.held[k]) *
+                     std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway,
+                 std::numeric_limits<double>::min());
   }
 }
 

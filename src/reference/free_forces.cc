@@ -229,8 +229,7 @@ RunSummary FreeDynamics::FollowHeld(double t_s, const ForceRows& loops, const Bo
     const MatX reactions = ReactionsBy(loops, moved, wrenches);
     VecX next(n->size());
     for (size_t d = 0; d < loaded_.size(); ++d) {
-      next[static_cast<Eigen::Index>(d)] =
-          SizeOf(LoadOf(mechanism_, loaded_[d], moved, reactions));
+      next[static_cast<Eigen::Index>(d)] = SizeOf(LoadOf(mechanism_, loaded_[d], moved, reactions));
     }
     const double change = (next - *n).cwiseAbs().maxCoeff(), most = next.maxCoeff();
     *n = next;

@@ -159,7 +159,7 @@ class FreeMotion {
   std::vector<Vec3> start_W_;  ///< body origins at the start
   std::unique_ptr<Stepper> stepper_;
   std::vector<double> breaks_;
-  UntilJump time_;  ///< at which forces are evaluated
+  UntilJump time_;          ///< at which forces are evaluated
   std::deque<Node> nodes_;  ///< before now_, since the last break or bridge
   Node now_;
   std::optional<Bridge> bridge_;
@@ -178,7 +178,7 @@ class FreeMotion {
   std::vector<size_t> all_friction_;       ///< with those that are
   std::vector<size_t> off_;
   std::vector<size_t> corner_elements_;
-  std::vector<char> fresh_;                ///< per element: slides since this very time
+  std::vector<char> fresh_;  ///< per element: slides since this very time
   std::vector<double> events_s_;
   int settled_here_ = 0;  ///< how often friction was decided at this very time
 };

@@ -122,8 +122,8 @@ void WriteBands(const ReferenceSample& sample, const ChannelColumns& columns,
 
 }  // namespace
 
-void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample, const ChannelColumns& columns,
-                 Eigen::Ref<Eigen::RowVectorXd> row) {
+void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample,
+                 const ChannelColumns& columns, Eigen::Ref<Eigen::RowVectorXd> row) {
   const auto put = [&](Quantity quantity, Eigen::Index k, double value) {
     row[columns(quantity, static_cast<size_t>(k))] = value;
   };

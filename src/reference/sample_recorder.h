@@ -39,8 +39,8 @@ class SampleRecorder {
                                                      const Motion& motion, bool reactions);
 /// Writes a sample into `row`: every channel of ReferenceChannels() that `columns` has, and the
 /// work if there is any.
-void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample, const ChannelColumns& columns,
-                 Eigen::Ref<Eigen::RowVectorXd> row);
+void WriteSample(const Mechanism& mechanism, const ReferenceSample& sample,
+                 const ChannelColumns& columns, Eigen::Ref<Eigen::RowVectorXd> row);
 
 // Whether idle spins are idle (mechanism/idle_spins.h). Internal to reference/.
 

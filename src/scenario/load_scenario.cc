@@ -38,10 +38,9 @@ constexpr double kMissedBySteps = 2e-6;
 constexpr double kMostTableSteps = 2e5;  // no smaller step is taken than that gives
 
 const std::vector<std::string> kMotionScenarioKeys = {
-    "kind",      "mechanism", "description", "parameters", "gravity",    "motion",
-    "loads",     "forces",    "analytic",    "reference",  "simulation", "checks",
-    "snapshots", "expect",    "witnesses",   "figures",    "contacts",   "phases",
-    "switches"};
+    "kind",      "mechanism", "description", "parameters", "gravity", "motion",    "loads",
+    "forces",    "analytic",  "reference",   "simulation", "checks",  "snapshots", "expect",
+    "witnesses", "figures",   "contacts",    "phases",     "switches"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;

@@ -813,12 +813,9 @@ class MotionReader {
         continue;
       }
       Profile& profile = first == 0 ? load->force[i] : load->moment[i];
-      profile = ReadProfile(values_, *(*items)[i], name,
-                            {.unit = unit,
-                             .home = {},
-                             .name = name,
-                             .may_jump = true,
-                             .tables = &tables_});
+      profile = ReadProfile(
+          values_, *(*items)[i], name,
+          {.unit = unit, .home = {}, .name = name, .may_jump = true, .tables = &tables_});
     }
   }
 

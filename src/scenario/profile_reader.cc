@@ -138,13 +138,15 @@ class ProfileReader : AmountReader {
         return;
       }
     } else if (const YamlNode* period = term.Find("period_s")) {
-      values_->yaml().Error(*period, fmt::format("{} needs count as well", term.PathOf("period_s")));
+      values_->yaml().Error(*period,
+                            fmt::format("{} needs count as well", term.PathOf("period_s")));
       return;
     }
     if (!height || !duration_s || !period_s || !count) return;
     if (*count > 1 && *period_s <= *duration_s) {
-      values_->yaml().Error(*node, fmt::format("{}: period_s = {} violates period_s > duration_s = {}",
-                                               path, *period_s, *duration_s));
+      values_->yaml().Error(
+          *node, fmt::format("{}: period_s = {} violates period_s > duration_s = {}", path,
+                             *period_s, *duration_s));
       return;
     }
     for (int k = 0; k < *count; ++k) {

@@ -56,10 +56,9 @@ inline void AddOneOfEach(Mechanism* m) {
                                 .dissipation = 0.1};
           break;
         case 6:
-          element.law = CurveLaw{.of_rate = c > 0,
-                                 .knots = {{-4.0, 3.0, 0.0, -0.4},
-                                           {0.3, 0.5, -1.0, -1.0},
-                                           {5.0, -2.0, -0.5, 0.0}}};
+          element.law = CurveLaw{
+              .of_rate = c > 0,
+              .knots = {{-4.0, 3.0, 0.0, -0.4}, {0.3, 0.5, -1.0, -1.0}, {5.0, -2.0, -0.5, 0.0}}};
           break;
         default:
           break;
@@ -67,10 +66,10 @@ inline void AddOneOfEach(Mechanism* m) {
       const bool ball = IsOfBall(m->joints[j].kind, c);
       // A ball's position is none, and a rotor on it has no carrier.
       const auto* rotor = std::get_if<RotorLaw>(&element.law);
-      if (ball && (std::holds_alternative<SpringLaw>(element.law) ||
-                   std::holds_alternative<StopLaw>(element.law) ||
-                   std::holds_alternative<CurveLaw>(element.law) ||
-                   (rotor != nullptr && rotor->carrier))) {
+      if (ball &&
+          (std::holds_alternative<SpringLaw>(element.law) ||
+           std::holds_alternative<StopLaw>(element.law) ||
+           std::holds_alternative<CurveLaw>(element.law) || (rotor != nullptr && rotor->carrier))) {
         element.law = DampingLaw{.damping = 0.2};
       }
       if (rotor != nullptr && rotor->carrier && rotor->carrier->body == 0) {

@@ -135,7 +135,8 @@ TEST(Elements, WhatMeansNothingIsAFinding) {
 
 TEST(Elements, FrictionByLoadNeedsAJournalOrAGuide) {
   const std::string radius =
-      "  hint: radius: of the journal or ball of a joint whose friction is coefficient times radius "
+      "  hint: radius: of the journal or ball of a joint whose friction is coefficient times "
+      "radius "
       "times its load\n";
   EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coefficient: 0.2}\n"),
             "m.yaml:10:6: error: elements.g needs a radius\n" + radius);
@@ -199,10 +200,11 @@ std::string WithCarried(const std::string& elements) {
 
 TEST(GearLosses, FollowACouplingOfTheirCoordinate) {
   const auto with = [](const std::string& element) {
-    return LoadModelText(WithElements("  g: {kind: friction, " + element + "}\n") +
-                             "couplings: {gear: {joint: slide, coordinate: 1, follows: turn, ratio: "
-                             "-1/5}}\n",
-                         "m.yaml");
+    return LoadModelText(
+        WithElements("  g: {kind: friction, " + element + "}\n") +
+            "couplings: {gear: {joint: slide, coordinate: 1, follows: turn, ratio: "
+            "-1/5}}\n",
+        "m.yaml");
   };
   const LoadResult loaded = with("joint: turn, coupling: gear, efficiency: 0.8");
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();

@@ -712,9 +712,7 @@ class Prover {
   static double LargestRadius(const FrictionLaw& law) {
     return law.coupling >= 0 ? 1.0 : std::max(law.radius, law.thrust_radius);
   }
-  static T PerLoad(const FrictionLaw& law) {
-    return T(law.coefficient) * T(LargestRadius(law));
-  }
+  static T PerLoad(const FrictionLaw& law) { return T(law.coefficient) * T(LargestRadius(law)); }
   std::string AddLoadFriction(const System& system, const std::vector<Virtual>& motions) {
     if (!reactions_unique_) {
       return "not provable: redundant constraints share the load of a joint with friction by load";
@@ -780,8 +778,8 @@ class Prover {
     }
     return "";
   }
-  // λ dP/dq along the element's coordinate of the coupling whose force it follows; couplings are the
-  // last of what transmits.
+  // λ dP/dq along the element's coordinate of the coupling whose force it follows; couplings are
+  // the last of what transmits.
   [[nodiscard]] T CouplingForce(size_t e, const std::vector<T>& forces) const {
     const ForceElement& element = mechanism().elements[e];
     const auto c = static_cast<size_t>(std::get<FrictionLaw>(element.law).coupling);

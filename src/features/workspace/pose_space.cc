@@ -408,10 +408,9 @@ bool PoseSpace::Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const {
                 .transpose() *
             rows->states.X_WB[static_cast<size_t>(joint.child)].linear() * joint.X_CM.linear();
         const Vec3 turned = R_FM * cone.axis;
-        margin = cone.angle - (cone.axis.isZero()
-                                   ? Eigen::AngleAxisd(R_FM).angle()
-                                   : std::atan2(cone.axis.cross(turned).norm(),
-                                                cone.axis.dot(turned)));
+        margin = cone.angle - (cone.axis.isZero() ? Eigen::AngleAxisd(R_FM).angle()
+                                                  : std::atan2(cone.axis.cross(turned).norm(),
+                                                               cone.axis.dot(turned)));
         break;
       }
       case SetBound::Kind::kShapes: {

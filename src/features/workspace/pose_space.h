@@ -57,9 +57,9 @@ struct SetBound {
   std::string name;     ///< "leg1 at 0.75 m": of drive, joint and side, to read
   std::string subject;  ///< of drive, joint or coordinate; "" of singularities
   bool upper = false;
-  double limit = 0.0;  ///< [m or rad]
-  int watched = -1;    ///< of SpacePose::watched; kBox: a coordinate, kCone: one of the cones,
-                       ///< kShapes: a pair
+  double limit = 0.0;      ///< [m or rad]
+  int watched = -1;        ///< of SpacePose::watched; kBox: a coordinate, kCone: one of the cones,
+                           ///< kShapes: a pair
   std::string unit = "1";  ///< of its margin: "m", "rad", "1"
 };
 [[nodiscard]] const char* WordOf(SetBound::Kind kind);
@@ -127,7 +127,7 @@ struct PlacedPose {
   double type2 = kNan;  ///< det D by the product of its rows at home, > 0 there; NaN: not as many
                         ///< drives as degrees of freedom
   double type2_size = kNan;  ///< product of the rows of D
-  double least = kNan;  ///< of A: its last pivot by its first
+  double least = kNan;       ///< of A: its last pivot by its first
 };
 
 class PoseSpace {

@@ -62,9 +62,8 @@ class QuestionReader {
     ReadCones();
     if (failed_ || !Choose()) return std::nullopt;
     question_.output = output_;
-    question_.ranges_changed =
-        !arguments_.ranges.empty() || !arguments_.cones.empty() || !ranged_.empty() ||
-        std::isfinite(arguments_.clearance);
+    question_.ranges_changed = !arguments_.ranges.empty() || !arguments_.cones.empty() ||
+                               !ranged_.empty() || std::isfinite(arguments_.clearance);
     return std::move(question_);
   }
 
@@ -79,9 +78,10 @@ class QuestionReader {
     if (arguments_.output.empty()) {
       output_ = m.outputs.empty() ? "" : m.outputs.front().name;
       if (m.outputs.empty() && arguments_.over.empty()) {
-        Error(m.file, "the model has no output, whose poses could be asked",
-              "name a body or a frame by --output, joints or drives by --over, or state outputs: in "
-              "the model");
+        Error(
+            m.file, "the model has no output, whose poses could be asked",
+            "name a body or a frame by --output, joints or drives by --over, or state outputs: in "
+            "the model");
       }
       return !failed_;
     }
@@ -91,14 +91,12 @@ class QuestionReader {
     for (const Output& output : m.outputs) names.push_back(output.name);
     for (size_t b = 1; b < m.bodies.size(); ++b) names.push_back(m.bodies[b].name);
     Error("--output " + output_, "there is no such output",
-          DidYouMean(
-              output_, names,
-              "there are: " + Joined(names, kMostNamed)));
+          DidYouMean(output_, names, "there are: " + Joined(names, kMostNamed)));
     return false;
   }
 
-  // A moving body, "BODY.FRAME" or a frame whose name is used once, in the world: robots' files state
-  // no outputs.
+  // A moving body, "BODY.FRAME" or a frame whose name is used once, in the world: robots' files
+  // state no outputs.
   bool AddOutput() {
     Mechanism& m = question_.mechanism;
     std::vector<Output> found;
@@ -703,13 +701,15 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     return result;
   }
   const double boundary_s =
-      settings.over == 3 ? plan.closing_s * static_cast<double>(kEnoughClosings) / arguments.flood.threads : 0.0;
+      settings.over == 3
+          ? plan.closing_s * static_cast<double>(kEnoughClosings) / arguments.flood.threads
+          : 0.0;
   if (which.lattice && which.announce && plan.estimate_s + boundary_s > kLong_s) {
     which.announce(fmt::format(
         "the lattice takes about {}{}", TimeText(plan.estimate_s),
-        settings.over == 3 ? fmt::format(", the boundary up to {} (a million poses)",
-                                         TimeText(boundary_s))
-                           : ""));
+        settings.over == 3
+            ? fmt::format(", the boundary up to {} (a million poses)", TimeText(boundary_s))
+            : ""));
   }
   // Both ways at once; neither knows of the other.
   FloodSettings flood = arguments.flood;
@@ -749,9 +749,9 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     return result;
   }
   if (!result.traced.gone.empty()) {
-    result.notes.push_back(fmt::format(
-        "{} sections have no boundary, and what lies about them counts as error: {}",
-        result.traced.gone.size(), result.traced.gone.front()));
+    result.notes.push_back(
+        fmt::format("{} sections have no boundary, and what lies about them counts as error: {}",
+                    result.traced.gone.size(), result.traced.gone.front()));
   }
   if (result.traced.summary.ok()) CheckByReference(question, space, &result);
   FindShares(&result);

@@ -24,7 +24,7 @@ using std::numbers::pi;
 
 constexpr int kDegree = 8;           // of the polynomials along a step
 constexpr double kTail = 1e-9;       // last coefficients by the size of the set
-constexpr double kOnBound = 1e-2;   // of the margins before and behind it
+constexpr double kOnBound = 1e-2;    // of the margins before and behind it
 constexpr double kRoundings = 10.0;  // by which a margin at a crossing is off, from what it is
 constexpr double kBeyond = 1e-9;     // margins below −this are outside
 constexpr double kDip = 1e-8;        // the same between two nodes, by their polynomial
@@ -40,9 +40,9 @@ constexpr size_t kMostSections = 1200;
 // Beyond, a volume has the error that it has; a rough one goes on for longer.
 constexpr double kRough = 1e-3;
 constexpr long kMostClosings = 6000000;
-constexpr double kEndsShare = 0.1;   // of the progress
-constexpr double kSliver = 1e-3;     // of a part, within which its ends are known
-constexpr double kMoved = 0.02;      // of a solid's height, by which its ends have moved
+constexpr double kEndsShare = 0.1;            // of the progress
+constexpr double kSliver = 1e-3;              // of a part, within which its ends are known
+constexpr double kMoved = 0.02;               // of a solid's height, by which its ends have moved
 constexpr double kSlab = 1e-6, kWider = 4.0;  // of a solid's height, about a section that is lost
 constexpr double kMostSlabs = 0.01;
 constexpr size_t kNearSections = 2;  // on each side, whose poses begin another one
@@ -225,8 +225,8 @@ class Tracer {
       }
       if (hit.bound < 0 || !space_.Step(at, first * along, &hit.at)) return std::nullopt;
       const VecX& margin = hit.at.pose.margin;
-      const double size = std::max(std::abs(at.pose.margin[hit.bound]),
-                                   std::abs(next.pose.margin[hit.bound]));
+      const double size =
+          std::max(std::abs(at.pose.margin[hit.bound]), std::abs(next.pose.margin[hit.bound]));
       if (!(std::abs(margin[hit.bound]) < kOnBound * size)) return std::nullopt;
       bool inside = true;
       for (Eigen::Index j = 0; j < margin.size(); ++j) {
@@ -1132,9 +1132,8 @@ class SolidTracer {
         const double slab =
             std::isfinite(part.slab) ? kWider * part.slab : kSlab * (set.high - set.low);
         const auto first = gone_.lower_bound(part.a);
-        const auto at = std::find_if(first, gone_.end(), [&](const auto& gone) {
-          return part.Has(gone.first);
-        });
+        const auto at = std::find_if(first, gone_.end(),
+                                     [&](const auto& gone) { return part.Has(gone.first); });
         if (at == gone_.end()) {
           lost_ = fmt::format("sections between {:.6g} and {:.6g} have no area", part.a, part.b);
           break;
@@ -1270,9 +1269,9 @@ class SolidTracer {
   ResultLog log_;
   std::map<double, std::vector<SpacePose>> seeds_;
   std::map<double, TracedSection> sections_;
-  std::map<double, std::string> gone_;             // heights without a section, and why
+  std::map<double, std::string> gone_;            // heights without a section, and why
   std::vector<std::pair<double, double>> slabs_;  // left out
-  std::string lost_;                               // all of it, and why
+  std::string lost_;                              // all of it, and why
   long closings_ = 0;
   bool completed_ = false, unbounded_ = false;
 };

@@ -113,9 +113,8 @@ std::string IdentityOf(const WorkspaceArguments& arguments, const std::vector<In
   }
   for (const std::string& text : {asked.output, robot.base, arguments.way}) sum.Add(text);
   sum.Add(fmt::format("{} {} {} {} {} {} {} {}", asked.clearance, asked.cross_singularities,
-                      asked.flood.resolution,
-                      robot.free_base, robot.closure_tolerance_m, arguments.local,
-                      arguments.evaluations, arguments.seed));
+                      asked.flood.resolution, robot.free_base, robot.closure_tolerance_m,
+                      arguments.local, arguments.evaluations, arguments.seed));
   return sum.Text();
 }
 
@@ -198,9 +197,9 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   if (!folder) return 2;
   SetReport report;
   report.mechanism = mechanism.name;
-  report.set = ComputeReachableSet(
-      *question, asked, progress, folder.get(),
-      {.announce = [](const std::string& text) { Say(stderr, "{}\n", text); }});
+  report.set =
+      ComputeReachableSet(*question, asked, progress, folder.get(),
+                          {.announce = [](const std::string& text) { Say(stderr, "{}\n", text); }});
   line->Clear();
   SayText(stderr, report.set.diagnostics.Text());
   if (report.set.diagnostics.has_errors()) return 2;
@@ -247,7 +246,8 @@ std::string CommandOf(const WorkspaceArguments& arguments, const DesignQuestion&
   add("--from", asked.from);
   add("--range", asked.ranges);
   add("--cone", asked.cones);
-  if (std::isfinite(asked.clearance)) command += fmt::format(" --clearance {:.17g}", asked.clearance);
+  if (std::isfinite(asked.clearance))
+    command += fmt::format(" --clearance {:.17g}", asked.clearance);
   add("--for-all", asked.for_all);
   add("--for-some", asked.for_some);
   if (asked.cross_singularities) command += " --cross-singularities";
@@ -329,7 +329,8 @@ int WaysToClose(const WorkspaceArguments& arguments, const Mechanism& mechanism,
       (arguments.joint_space && !arguments.modes.empty())) {
     diagnostics.AddError(arguments.joint_space ? "--joint-space" : "--modes",
                          "it asks for another thing than a set of poses",
-                         "leave out --resolution, --cone, --clearance, --cross-singularities, --way and the other one "
+                         "leave out --resolution, --cone, --clearance, --cross-singularities, "
+                         "--way and the other one "
                          "of --modes and --joint-space");
   }
   nlohmann::ordered_json json = OutcomeJson(mechanism.name, true, {});
@@ -476,8 +477,9 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   arguments->json.AddTo(workspace);
-  workspace->add_option("--formats", arguments->formats,
-                        "pdf, png: figures of a set for print, beside their SVG")
+  workspace
+      ->add_option("--formats", arguments->formats,
+                   "pdf, png: figures of a set for print, beside their SVG")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::IsMember({"pdf", "png"}));

@@ -791,8 +791,8 @@ class Companion {
     }
     const auto* friction = std::get_if<FrictionLaw>(&element.law);
     if (friction != nullptr && friction->coupling >= 0) {
-      place += ", coupling: " +
-               YamlName(m_.couplings[static_cast<size_t>(friction->coupling)].name);
+      place +=
+          ", coupling: " + YamlName(m_.couplings[static_cast<size_t>(friction->coupling)].name);
     }
     if (IsGyroscopic(element)) {
       const RotorAxis& axis = *std::get<RotorLaw>(element.law).carrier;

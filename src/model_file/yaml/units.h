@@ -29,8 +29,8 @@ struct UnitSuffix {
 inline constexpr UnitSuffix kPlain{"", "", [](double value) { return value; }};
 inline constexpr UnitSuffix kDeg{"_deg", "rad", FromDegrees};
 inline constexpr UnitSuffix kMm{"_mm", "m", FromMillimetres};
-inline constexpr UnitSuffix kRpm{
-    "_rpm", "rad/s", [](double value) { return value * std::numbers::pi / 30.0; }};
+inline constexpr UnitSuffix kRpm{"_rpm", "rad/s",
+                                 [](double value) { return value * std::numbers::pi / 30.0; }};
 /// Units of data sheets: N/mm and N s/mm, N m/° and N m s/°, and others.
 inline constexpr UnitSuffix kPerMm{"_per_mm", "m", [](double value) { return value * 1e3; }};
 inline constexpr UnitSuffix kPerDeg{"_per_deg", "rad",

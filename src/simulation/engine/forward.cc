@@ -92,7 +92,7 @@ class StickSlip {
   std::vector<size_t> off_;      ///< switched off: they count as sliding, without a force
   std::vector<size_t> corners_;  ///< elements whose law has corners
   std::vector<int> pieces_;      ///< of these, at the present node
-  std::vector<double> rates_;  ///< of these, by (1)
+  std::vector<double> rates_;    ///< of these, by (1)
   RunSummary trouble_ = RunSummary::Done();
   int uniform_ = 4;  ///< nodes since the last event, as in Step
 };
@@ -195,8 +195,9 @@ int StickSlip::Started(size_t element) const {
 }
 
 bool StickSlip::Ended() const {
-  return Pieces() != pieces_ || std::ranges::any_of(friction_elements_,
-                             [this](size_t e) { return Stopped(e) || Started(e) != 0; });
+  return Pieces() != pieces_ || std::ranges::any_of(friction_elements_, [this](size_t e) {
+           return Stopped(e) || Started(e) != 0;
+         });
 }
 
 RunSummary StickSlip::Go(double from_s, double h, bool multistep) {

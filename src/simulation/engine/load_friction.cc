@@ -39,8 +39,7 @@ std::vector<size_t> LoadedElements(const Mechanism& mechanism) {
 
 VecX LoadFrictionOf(Session* session) {
   VecX sizes = VecX::Zero(static_cast<Eigen::Index>(session->engine.mechanism->elements.size()));
-  const std::vector<BearingLoad> loads =
-      session->recorder.LoadsOf(session->loaded, session->loads);
+  const std::vector<BearingLoad> loads = session->recorder.LoadsOf(session->loaded, session->loads);
   for (size_t d = 0; d < loads.size(); ++d) {
     sizes[static_cast<Eigen::Index>(session->loaded[d])] = SizeOf(loads[d]);
   }
@@ -100,7 +99,8 @@ void LoadFriction::FindLoads() {
     s_.system.SetLoadFriction(own);
     const std::vector<BearingLoad> moved = s_.recorder.LoadsOf(s_.loaded, s_.loads);
     for (size_t k = 0; k < moved.size(); ++k) {
-      P_[k][d] = at.rests ? BearingLoad(BearingLoad::Zero()) : BearingLoad((moved[k] - p_[k]) / force);
+      P_[k][d] =
+          at.rests ? BearingLoad(BearingLoad::Zero()) : BearingLoad((moved[k] - p_[k]) / force);
     }
   }
   s_.system.force() = found_;

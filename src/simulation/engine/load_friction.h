@@ -1,11 +1,13 @@
-// Friction that grows with the joint's own reaction, or with a coupling's force, on MuJoCo's forces.
+// Friction that grows with the joint's own reaction, or with a coupling's force, on MuJoCo's
+// forces.
 //
 //   F_e = −S_e sign q̇_e,  S_e = |p_e + Σ_d P_ed F_d|,  (1) of FrictionLaw                     (1)
 // p: loads of the bearings without such friction, as the recorder reads them (BearingLoad, |p| the
 // sum of its columns' lengths); P: what a unit force F_d adds, with Jᵀλ = −u_d. Where the motion is
-// commanded, friction changes forces only: it is found where forces are recorded and is not applied.
-// Newton on S. Where DOFs move by forces, MuJoCo is loaded by (1) by the loads that it finds itself,
-// until they no longer change (Integrator::Settle); what rests breaks away beyond Fs + S.
+// commanded, friction changes forces only: it is found where forces are recorded and is not
+// applied. Newton on S. Where DOFs move by forces, MuJoCo is loaded by (1) by the loads that it
+// finds itself, until they no longer change (Integrator::Settle); what rests breaks away beyond Fs
+// + S.
 #pragma once
 
 #include "simulation/engine/session.h"

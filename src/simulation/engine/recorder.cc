@@ -627,7 +627,7 @@ std::vector<BearingLoad> Recorder::LoadsOf(const std::vector<size_t>& elements,
   return bears;
 }
 
-// Forces of the bearings times the radii at which they rub; `reaction`: [moment; force] in F.
+// Forces of the bearings times the radii of their friction; `reaction`: [moment; force] in F.
 BearingLoad Recorder::InBearings(const Mechanism& mechanism, const ForceElement& element,
                                  const Vec6& reaction, const std::vector<Pose>& X_WB) {
   const auto& law = std::get<FrictionLaw>(element.law);

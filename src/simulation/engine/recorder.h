@@ -102,10 +102,10 @@ class Recorder {
   void Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row,
               std::vector<Pose>* X_WB);
 
-  /// Per element with friction by load, by the data's accelerations and constraint forces. Evaluates
-  /// the body forces.
+  /// Per element with friction by load, by the data's accelerations and constraint forces.
+  /// Evaluates the body forces.
   [[nodiscard]] std::vector<BearingLoad> LoadsOf(const std::vector<size_t>& elements,
-                                               const Loads& loads);
+                                                 const Loads& loads);
 
   /// True if there is dry friction.
   [[nodiscard]] bool has_bands() const {

@@ -147,7 +147,7 @@ struct Session {
   Loads loads;
   Recorder recorder;
   WorkMeter work;
-  UntilJump until;  ///< at which time forces are evaluated
+  UntilJump until;      ///< at which time forces are evaluated
   const bool released;  ///< the motion of some drive is not prescribed: friction and accelerations
                         ///< are MuJoCo's
   const std::vector<size_t> loaded;         ///< elements with friction by their joint's load

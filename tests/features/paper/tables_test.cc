@@ -41,8 +41,8 @@ TEST(MakeTables, MotorsOfAModelAreSized) {
   // The law by hand: docs/how-to/size_motors.md works this machine out (0.19981 N m, 0.1073 N m
   // RMS, 40 π rad/s, 30 % of the rated speed); a stop by the brake asks more of the gearbox.
   EXPECT_THAT(Texts(outcome.tables[0].rows.at(0)),
-              testing::ElementsAre("motor", "0.2 N m", "0.107 N m", "126 rad/s", "23.7 W",
-                                   "55.6 %", "gearbox emergency"));
+              testing::ElementsAre("motor", "0.2 N m", "0.107 N m", "126 rad/s", "23.7 W", "55.6 %",
+                                   "gearbox emergency"));
   options.scenario.set = {{"motion.duration_s", "0.1"}};
   const TablesOutcome shorter = MakeTables(TablesScenario("slider_crank/motor"), options);
   ASSERT_EQ(shorter.tables.size(), 1u) << shorter.diagnostics.Text();

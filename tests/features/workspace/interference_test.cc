@@ -27,7 +27,7 @@ TEST(Interference, GapsAreThoseByHand) {
     box.points.emplace_back((k & 1) != 0 ? 0.1 : -0.1, (k & 2) != 0 ? 0.1 : -0.1,
                             (k & 4) != 0 ? 0.1 : -0.1);
   }
-  EXPECT_NEAR(GapOf(ball, here, box, here), 0.1, 1e-15);                       // a face
+  EXPECT_NEAR(GapOf(ball, here, box, here), 0.1, 1e-15);                          // a face
   EXPECT_NEAR(GapOf(ball, here, box, there), std::hypot(0.4, 0.2) - 0.1, 1e-15);  // an edge
   EXPECT_NEAR(GapOf(box, here, box, there), 0.3, 1e-15);
   Pose turned = there;
@@ -108,7 +108,8 @@ TEST(Interference, ASetEndsAtItsClearanceFromAnObstacle) {
     EXPECT_GT(excluded(0.0301) - excluded(0.03), 10 * (set.traced.error + 1e-7));
     ASSERT_FALSE(set.shares.empty());
     EXPECT_TRUE(std::ranges::any_of(set.shares, [&](const BoundShare& share) {
-      return share.bound >= 0 && set.bounds[static_cast<size_t>(share.bound)].name == "tool to post";
+      return share.bound >= 0 &&
+             set.bounds[static_cast<size_t>(share.bound)].name == "tool to post";
     }));
     SetArguments without = arguments;
     without.clearance = kNan;

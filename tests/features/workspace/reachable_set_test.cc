@@ -551,8 +551,8 @@ TEST(ReachableSet, ASectionOfTheScaraRobotIsThatOfItsClosedForm) {
   EXPECT_GT(checked, 100u);
 }
 
-// On the axes of symmetry of this platform two branches of type 2 cross at any height, and near home
-// many are close: margins are a thousand times as large as at home, the set a hundredth of the
+// On the axes of symmetry of this platform two branches of type 2 cross at any height, and near
+// home many are close: margins are a thousand times as large as at home, the set a hundredth of the
 // mechanism.
 TEST(ReachableSet, SectionsWithManyTypeTwoCurvesAreFollowed) {
   const Mechanism platform = ShippedModel("stabilizing_platform");

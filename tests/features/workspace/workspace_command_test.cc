@@ -77,7 +77,8 @@ TEST_F(WorkspaceCommand, WaysToCloseAndTypeTwoCurvesAreListed) {
 }
 
 TEST_F(WorkspaceCommand, AnotherWayToCloseAndFiguresForPrint) {
-  const std::string asked = "friction_five_bar --over x,y --resolution 30 --formats pdf,png --json - ";
+  const std::string asked =
+      "friction_five_bar --over x,y --resolution 30 --formats pdf,png --json - ";
   const ProgramResult home = Call(asked), other = Call(asked + "--way output=2");
   ASSERT_EQ(other.exit_code, 0) << other.err;
   const auto set = nlohmann::json::parse(other.out)["set"];
