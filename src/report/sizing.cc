@@ -125,6 +125,7 @@ std::string HoldingHtml(const Motor& motor, const MotorLoad& load, const VecX& f
 
 std::string ElectricHtml(const std::vector<const MotorLoad*>& loads, const LinkLoad& link) {
   std::vector<PlotLine> lines;
+  lines.reserve(loads.size() + 1);
   for (const MotorLoad* load : loads) {
     lines.push_back(OverTime(load->drive, load->time_s, load->electric_W));
   }

@@ -32,7 +32,7 @@ constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
 constexpr double kFar = 200.0;  // a ray that goes on for so long has no end
-constexpr int kMostSteps = 20000, kMostCurveSteps = 800;  // of a path, of a loop
+constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
 constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
 constexpr int kSpreadRows = 6;
 constexpr int kRays = 8, kChords = 12;  // from home; from each loop
@@ -404,7 +404,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
   enum class Event { kNone, kCorner, kCloses, kCrossing };
   int idle = 0;  // corners at the same point
-  for (int step = 0; step < kMostCurveSteps; ++step) {
+  for (int step = 0; step < kMostArcSteps; ++step) {
     const Curve curve{&here.at, here.bound, t, n, s0, rate};
     const bool singular = IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
     std::array<PlacedPose, kDegree + 1> at;
