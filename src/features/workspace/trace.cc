@@ -31,7 +31,7 @@ constexpr double kDip = 1e-8;        // the same between two nodes, by their pol
 constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
-constexpr double kFar = 200.0;  // a ray that goes on for so long has no end
+constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
 constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
 constexpr int kSpreadRows = 6;
