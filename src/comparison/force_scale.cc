@@ -440,17 +440,27 @@ double SizeOf(const SpringLaw& law, const Rates& rates, const MotionSize& motion
   const double by_energy = std::sqrt(2.0 * k * std::max(0.0, motion.most_energy_J));
   return std::max(std::abs(at_home), std::min(by_energy, k * rates.velocity * motion.duration_s));
 }
-// What it stops: the energy of the motion before it, as of a spring.
+// By the energy that springs have and by how far beyond its ends the motion may come.
 double SizeOf(const StopLaw& law, const Rates& rates, const MotionSize& motion) {
-  const double deepest = std::max({0.0, rates.home - law.upper, law.lower - rates.home});
+  const double way = rates.velocity * motion.duration_s;
+  const double deepest =
+      std::max({0.0, rates.home + way - law.upper, law.lower - (rates.home - way)});
   const double stored = std::max(0.0, motion.most_energy_J) * (law.exponent + 1.0) / law.stiffness;
-  const double by_energy = law.stiffness * std::pow(stored, law.exponent / (law.exponent + 1.0));
-  return std::max(law.stiffness * std::pow(deepest, law.exponent), by_energy);
+  const double depth = std::min(deepest, std::pow(stored, 1.0 / (law.exponent + 1.0)));
+  return law.stiffness * std::pow(depth, law.exponent);
 }
-// Within its knots.
-double SizeOf(const CurveLaw& law, const Rates& /*rates*/, const MotionSize& /*motion*/) {
+// The largest force at knots that the motion may come to, and at the next ones.
+double SizeOf(const CurveLaw& law, const Rates& rates, const MotionSize& motion) {
+  const double middle = law.of_rate ? 0.0 : rates.home;
+  const double way = law.of_rate ? rates.velocity : rates.velocity * motion.duration_s;
+  const auto& knots = law.knots;
+  const auto first = std::ranges::lower_bound(knots, middle - way, {}, &CurveLaw::Knot::at);
+  const auto last = std::ranges::upper_bound(knots, middle + way, {}, &CurveLaw::Knot::at);
   double largest = 0.0;
-  for (const CurveLaw::Knot& knot : law.knots) largest = std::max(largest, std::abs(knot.force));
+  for (auto knot = first == knots.begin() ? first : first - 1; knot != knots.end() && knot <= last;
+       ++knot) {
+    largest = std::max(largest, std::abs(knot->force));
+  }
   return largest;
 }
 double SizeOf(const RotorLaw& law, const Rates& rates, const MotionSize& /*motion*/) {

@@ -192,9 +192,13 @@ void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample) {
       out.moment[c] = Evaluate(load.moment[c], t_s).value;
     }
   }
+  EvaluateSwitches(motion, t_s, &sample->engaged);
+}
+
+void EvaluateSwitches(const Motion& motion, double t_s, std::vector<double>* engaged) {
   for (const Switch& one : motion.switches) {
-    if (sample->engaged.size() <= one.element) sample->engaged.resize(one.element + 1, 1.0);
-    sample->engaged[one.element] = Evaluate(one.share, t_s).value;
+    if (engaged->size() <= one.element) engaged->resize(one.element + 1, 1.0);
+    (*engaged)[one.element] = Evaluate(one.share, t_s).value;
   }
 }
 

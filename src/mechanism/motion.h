@@ -197,6 +197,9 @@ struct CommandSample {
 /// Evaluates every profile at t. Allocates only when `sample` is first used.
 void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample);
 
+/// CommandSample::engaged alone.
+void EvaluateSwitches(const Motion& motion, double t_s, std::vector<double>* engaged);
+
 /// Motion of everything driven at one instant: the drives in model order, then the prescribed
 /// joints in model order.
 struct DrivenSample {

@@ -16,6 +16,8 @@ namespace {
 const std::vector<std::string> kKinds = {"damping", "spring", "rotor",  "friction",
                                          "stop",    "curve",  "bushing"};
 
+constexpr std::initializer_list<UnitSuffix> kSlopes = {kPlain, kPerMm, kPerDeg};
+
 // The keys of a kind beside those of its place.
 const std::vector<std::string>& KeysOf(const std::string& kind) {
   static const std::map<std::string, std::vector<std::string>> keys = {
@@ -154,43 +156,21 @@ bool ElementReader::ReadSpringPlace(const Block& block, const YamlMap& map, Forc
     springs_.push_back(std::move(between));
     return true;
   }
-  const YamlNode& node = *map.Find("spring");
-  const auto name = yaml.Text(node, map.PathOf("spring"));
-  if (!name) return false;
-  for (const std::string& level : block.levels) {
-    if (element->spring < 0) element->spring = IndexOf(springs_, level + *name);
-  }
-  if (element->spring >= 0) return true;
-  std::vector<std::string> names;
-  for (const SpringDamper& spring : springs_) names.push_back(spring.name);
-  yaml.Error(node,
-             fmt::format("{} = {}: there is no such spring", map.PathOf("spring"), Describe(node)),
-             DidYouMean(*name, names));
-  return false;
+  element->spring =
+      FindNamed(springs_, "spring", block, *map.Find("spring"), map.PathOf("spring"), &yaml);
+  return element->spring >= 0;
 }
 
 // A joint drive stands for its coordinate.
 bool ElementReader::ReadDrive(const Block& block, const YamlMap& map, ForceElement* element) {
   YamlReader& yaml = values_.yaml();
-  const YamlNode& node = *map.Find("drive");
-  const auto name = yaml.Text(node, map.PathOf("drive"));
-  if (!name) return false;
   if (const YamlNode* coordinate = map.Find("coordinate")) {
     yaml.Error(*coordinate, fmt::format("{}: a drive has one coordinate", map.path()));
     return false;
   }
-  int index = -1;
-  for (const std::string& level : block.levels) {
-    if (index < 0) index = IndexOf(drives_, level + *name);
-  }
-  if (index < 0) {
-    std::vector<std::string> names;
-    for (const Drive& drive : drives_) names.push_back(drive.name);
-    yaml.Error(node,
-               fmt::format("{} = {}: there is no such drive", map.PathOf("drive"), Describe(node)),
-               DidYouMean(*name, names));
-    return false;
-  }
+  const int index =
+      FindNamed(drives_, "drive", block, *map.Find("drive"), map.PathOf("drive"), &yaml);
+  if (index < 0) return false;
   if (const auto* on = std::get_if<JointDrive>(&drives_[static_cast<size_t>(index)].kind)) {
     element->joint = on->joint;
     element->coordinate = on->coordinate;
@@ -233,22 +213,16 @@ std::string ElementReader::NameOf(const ForceElement& element) const {
 // Per metre or radian, or per millimetre or degree; at least 0, and required.
 std::optional<double> ElementReader::Slope(const Block& block, const YamlMap& map,
                                            const std::string& key, const ForceElement* element) {
-  YamlReader& yaml = values_.yaml();
-  const auto found = map.FindInUnit(key, {kPlain, kPerMm, kPerDeg});
-  if (found.node == nullptr) {
-    (void)map.Required(key);
+  const auto found = map.FindInUnit(key, kSlopes);
+  if (found.node != nullptr && element != nullptr &&
+      !found.unit.Suits(IsAlongLength(*element) ? "m" : "rad")) {
+    values_.yaml().Error(
+        *found.node,
+        fmt::format("{}: the coordinate of '{}' is {}", map.PathOf(found.key), NameOf(*element),
+                    IsAlongLength(*element) ? "a length" : "an angle"));
     return std::nullopt;
   }
-  const std::string path = map.PathOf(found.key);
-  if (element != nullptr && !found.unit.Suits(IsAlongLength(*element) ? "m" : "rad")) {
-    yaml.Error(*found.node, fmt::format("{}: the coordinate of '{}' is {}", path, NameOf(*element),
-                                        IsAlongLength(*element) ? "a length" : "an angle"));
-    return std::nullopt;
-  }
-  const auto value = values_.Number(block, *found.node, path, found.unit);
-  if (!value || *value >= 0.0) return value;
-  yaml.Error(*found.node, fmt::format("{} = {} violates {} >= 0", path, *value, key));
-  return std::nullopt;
+  return NotNegative(block, map, key, kSlopes);
 }
 
 std::optional<DampingLaw> ElementReader::ReadDamping(const Block& block, const YamlMap& map,
@@ -295,7 +269,7 @@ std::optional<StopLaw> ElementReader::ReadStop(const Block& block, const YamlMap
                fmt::format("{} = {} violates exponent >= 1", map.PathOf("exponent"), *exponent));
     good = false;
   }
-  const bool damps = map.FindInUnit("damping", {kPlain, kPerMm, kPerDeg}).node != nullptr;
+  const bool damps = map.FindInUnit("damping", kSlopes).node != nullptr;
   const auto damping = damps ? Slope(block, map, "damping", element) : 0.0;
   const auto dissipation = map.Has("dissipation") ? NotNegative(block, map, "dissipation") : 0.0;
   if (damps && map.Has("dissipation")) {
@@ -345,27 +319,6 @@ void MakeMonotone(std::vector<CurveLaw::Knot>* knots) {
 
 }  // namespace
 
-// Pairs [a, b], the first in a unit, increasing; at least two.
-std::optional<std::vector<std::array<double, 2>>> ElementReader::ReadPairs(const Block& block,
-                                                                           const YamlNode& node,
-                                                                           const std::string& path,
-                                                                           const UnitSuffix& unit) {
-  YamlReader& yaml = values_.yaml();
-  const auto items = yaml.Items(node, path);
-  if (!items) return std::nullopt;
-  std::vector<std::array<double, 2>> pairs;
-  for (size_t i = 0; i < items->size(); ++i) {
-    const std::string at = fmt::format("{}[{}]", path, i);
-    const auto two = yaml.Items(*(*items)[i], at, 2);
-    if (!two) return std::nullopt;
-    const auto a = values_.Number(block, *(*two)[0], at + "[0]", unit);
-    const auto b = values_.Number(block, *(*two)[1], at + "[1]");
-    if (!a || !b) return std::nullopt;
-    pairs.push_back({*a, *b});
-  }
-  return pairs;
-}
-
 std::optional<CurveLaw> ElementReader::ReadCurve(const Block& block, const YamlMap& map,
                                                  const ForceElement* element) {
   YamlReader& yaml = values_.yaml();
@@ -391,20 +344,9 @@ std::optional<CurveLaw> ElementReader::ReadCurve(const Block& block, const YamlM
                                         curve.of_rate ? "rate" : "coordinate", NameOf(*element)));
     good = false;
   }
-  const auto points = ReadPairs(block, *found.node, path, found.unit);
+  const auto points = values_.Points(block, *found.node, path, found.unit);
   if (!points) return std::nullopt;
-  for (size_t i = 0; i < points->size(); ++i) {
-    if (i > 0 && !((*points)[i][0] > curve.knots.back().at)) {
-      yaml.Error(*found.node,
-                 fmt::format("{}[{}] = {} violates: increasing", path, i, (*points)[i][0]));
-      return std::nullopt;
-    }
-    curve.knots.push_back({.at = (*points)[i][0], .force = (*points)[i][1]});
-  }
-  if (curve.knots.size() < 2) {
-    yaml.Error(*found.node, path + " has fewer than two points");
-    return std::nullopt;
-  }
+  for (const auto& [at, force] : *points) curve.knots.push_back({.at = at, .force = force});
   if (!ReadSlopes(block, map, &curve) || !good) return std::nullopt;
   return curve;
 }
@@ -414,12 +356,12 @@ bool ElementReader::ReadSlopes(const Block& block, const YamlMap& map, CurveLaw*
   YamlReader& yaml = values_.yaml();
   std::vector<CurveLaw::Knot>& knots = curve->knots;
   if (const YamlNode* node = map.Find("slopes")) {
-    const auto slopes = ReadPairs(block, *node, map.PathOf("slopes"), kPlain);
+    const auto slopes = values_.Pairs(block, *node, map.PathOf("slopes"), kPlain);
     if (!slopes) return false;
     if (slopes->size() == knots.size() && !map.Has("interpolation") && !map.Has("beyond")) {
       for (size_t i = 0; i < knots.size(); ++i) {
-        knots[i].slope_before = (*slopes)[i][0];
-        knots[i].slope_after = (*slopes)[i][1];
+        knots[i].slope_before = (*slopes)[i].first;
+        knots[i].slope_after = (*slopes)[i].second;
       }
       return true;
     }
@@ -467,7 +409,7 @@ std::optional<std::vector<double>> ElementReader::ReadPolynomial(const Block& bl
                                                                  const YamlMap& map,
                                                                  const ForceElement* element) {
   YamlReader& yaml = values_.yaml();
-  const bool linear = map.FindInUnit("stiffness", {kPlain, kPerMm, kPerDeg}).node != nullptr;
+  const bool linear = map.FindInUnit("stiffness", kSlopes).node != nullptr;
   if (linear == map.Has("polynomial")) {
     yaml.Error(*map.node(), fmt::format("{} needs either stiffness or polynomial", map.path()),
                "stiffness: force by deflection; polynomial: the coefficients of x, x², x³, x⁴");
@@ -483,16 +425,7 @@ std::optional<std::vector<double>> ElementReader::ReadPolynomial(const Block& bl
 
 std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlMap& map,
                                                  const ForceElement* element) {
-  const auto found = map.FindInUnit("inertia", {kPlain, kKgCm2});
-  if (found.node == nullptr) (void)map.Required("inertia");
-  auto inertia = found.node == nullptr
-                     ? std::nullopt
-                     : values_.Number(block, *found.node, map.PathOf(found.key), found.unit);
-  if (inertia && *inertia < 0.0) {
-    values_.yaml().Error(
-        *found.node, fmt::format("{} = {} violates inertia >= 0", map.PathOf(found.key), *inertia));
-    inertia.reset();
-  }
+  const auto inertia = NotNegative(block, map, "inertia", {kPlain, kKgCm2});
   std::optional<double> ratio = 1.0;
   if (const YamlNode* node = map.Find("ratio")) {
     ratio = values_.Number(block, map, "ratio", {kPlain});
@@ -531,27 +464,15 @@ bool ElementReader::ReadGearLoss(const Block& block, const YamlMap& map,
     yaml.Error(*map.Find(key), fmt::format("{} has no meaning with a coupling", map.PathOf(key)));
     return false;
   }
-  const auto name = yaml.Text(*node, map.PathOf("coupling"));
-  if (!name) return false;
-  for (const std::string& level : block.levels) {
-    if (law->coupling < 0) law->coupling = IndexOf(couplings_, level + *name);
-  }
-  if (law->coupling < 0) {
-    std::vector<std::string> names;
-    for (const Coupling& coupling : couplings_) names.push_back(coupling.name);
-    yaml.Error(
-        *node,
-        fmt::format("{} = {}: there is no such coupling", map.PathOf("coupling"), Describe(*node)),
-        DidYouMean(*name, names));
-    return false;
-  }
+  law->coupling = FindNamed(couplings_, "coupling", block, *node, map.PathOf("coupling"), &yaml);
+  if (law->coupling < 0) return false;
   const auto& terms = couplings_[static_cast<size_t>(law->coupling)].terms;
   if (std::ranges::none_of(terms, [&](const Coupling::Term& term) {
         return term.joint == element.joint && term.coordinate == element.coordinate;
       })) {
     yaml.Error(*node,
                fmt::format("{} = {} does not couple the coordinate of '{}'", map.PathOf("coupling"),
-                           *name, NameOf(element)),
+                           node->text, NameOf(element)),
                "joint: one of those that it couples");
     return false;
   }
@@ -642,8 +563,7 @@ std::optional<FrictionLaw> ElementReader::ReadDry(const Block& block, const Yaml
   if (loaded && !map.Has("coulomb") && !map.Has("breakaway") && !map.Has("stribeck_rate")) {
     return FrictionLaw{};
   }
-  const bool stated = map.Required("coulomb") != nullptr;
-  const auto coulomb = stated ? NotNegative(block, map, "coulomb") : std::nullopt;
+  const auto coulomb = NotNegative(block, map, "coulomb");
   if (map.Has("stribeck_rate") && !map.Has("breakaway")) {
     yaml.Error(
         *map.Find("stribeck_rate"), fmt::format("{} needs breakaway as well", map.path()),
@@ -666,12 +586,19 @@ std::optional<FrictionLaw> ElementReader::ReadDry(const Block& block, const Yaml
   return std::nullopt;
 }
 
+// Required.
 std::optional<double> ElementReader::NotNegative(const Block& block, const YamlMap& map,
-                                                 const std::string& key) {
-  const auto value = values_.Number(block, map, key, {kPlain});
+                                                 const std::string& key,
+                                                 std::initializer_list<UnitSuffix> units) {
+  const auto found = map.FindInUnit(key, units);
+  if (found.node == nullptr) {
+    (void)map.Required(key);
+    return std::nullopt;
+  }
+  const std::string path = map.PathOf(found.key);
+  const auto value = values_.Number(block, *found.node, path, found.unit);
   if (!value || *value >= 0.0) return value;
-  values_.yaml().Error(*map.Find(key),
-                       fmt::format("{} = {} violates {} >= 0", map.PathOf(key), *value, key));
+  values_.yaml().Error(*found.node, fmt::format("{} = {} violates {} >= 0", path, *value, key));
   return std::nullopt;
 }
 

@@ -1,7 +1,7 @@
 // `elements` of a model file. Internal to the model loader.
 #pragma once
 
-#include <array>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <vector>
@@ -57,10 +57,6 @@ class ElementReader {
   std::optional<CurveLaw> ReadCurve(const Block& block, const YamlMap& map,
                                     const ForceElement* element);
   bool ReadSlopes(const Block& block, const YamlMap& map, CurveLaw* curve);
-  std::optional<std::vector<std::array<double, 2>>> ReadPairs(const Block& block,
-                                                              const YamlNode& node,
-                                                              const std::string& path,
-                                                              const UnitSuffix& unit);
   std::optional<double> Slope(const Block& block, const YamlMap& map, const std::string& key,
                               const ForceElement* element);
   [[nodiscard]] bool IsAlongLength(const ForceElement& element) const;
@@ -83,7 +79,8 @@ class ElementReader {
                     FrictionLaw* law);
   std::optional<std::vector<double>> ReadPolynomial(const Block& block, const YamlMap& map,
                                                     const ForceElement* element);
-  std::optional<double> NotNegative(const Block& block, const YamlMap& map, const std::string& key);
+  std::optional<double> NotNegative(const Block& block, const YamlMap& map, const std::string& key,
+                                    std::initializer_list<UnitSuffix> units = {kPlain});
 
   ModelValues& values_;
   const BodyNames& names_;

@@ -228,40 +228,25 @@ class MotorReader : public NumberReader {
     return lead.m;
   }
 
+  // [speed, torque], …
   std::vector<CurvePoint> ReadCurve(const char* key) {
     const YamlMap::InUnit found = map_.FindInUnit(key, kSpeeds);
     if (found.node == nullptr) return {};
     const std::string path = map_.PathOf(found.key);
-    const auto items = yaml().Items(*found.node, path);
-    if (!items) return {};
+    const auto points = values_.Points(scope_, *found.node, path, found.unit);
+    failed_ = failed_ || !points;
     std::vector<CurvePoint> curve;
-    for (size_t i = 0; i < items->size(); ++i) {
-      const auto point = ReadPoint(*(*items)[i], fmt::format("{}[{}]", path, i), found.unit);
-      if (!point) return {};
-      if (!curve.empty() && point->speed <= curve.back().speed) {
-        Fail(*(*items)[i], fmt::format("{}[{}]: speeds must increase", path, i));
-        return {};
-      }
-      curve.push_back(*point);
+    for (size_t i = 0; points && i < points->size(); ++i) {
+      const auto& [speed, torque] = (*points)[i];
+      curve.push_back({speed, torque});
+      if (speed >= 0.0 && torque >= 0.0) continue;
+      const auto& two = found.node->items[i]->items;
+      Fail(*found.node->items[i],
+           fmt::format("{}[{}] = [{}, {}] violates speed >= 0 and torque >= 0", path, i,
+                       two[0]->text, two[1]->text),
+           "limits hold for both directions");
     }
-    if (curve.size() < 2) Fail(*found.node, path + " has fewer than two points");
     return curve;
-  }
-
-  // [speed, torque]
-  std::optional<CurvePoint> ReadPoint(const YamlNode& node, const std::string& path,
-                                      const UnitSuffix& unit) {
-    const auto items = yaml().Items(node, path, 2);
-    if (!items) return {};
-    const auto speed = values_.Number(scope_, *(*items)[0], path + "[0]", unit);
-    const auto torque = values_.Number(scope_, *(*items)[1], path + "[1]");
-    if (!speed || !torque) return {};
-    if (*speed >= 0.0 && *torque >= 0.0) return CurvePoint{*speed, *torque};
-    Fail(node,
-         fmt::format("{} = [{}, {}] violates speed >= 0 and torque >= 0", path, (*items)[0]->text,
-                     (*items)[1]->text),
-         "limits hold for both directions");
-    return {};
   }
 
   void CheckTogether() {

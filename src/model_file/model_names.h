@@ -79,6 +79,23 @@ class BodyNames {
   ModelValues& values_;
 };
 
+/// The item that a name means in a block, of a kind for messages ("drive"): its index, or -1 after
+/// a finding.
+template <typename T>
+int FindNamed(const std::vector<T>& items, const char* kind, const Block& block,
+              const YamlNode& node, const std::string& path, YamlReader* yaml) {
+  const auto name = yaml->Text(node, path);
+  if (!name) return -1;
+  for (const std::string& level : block.levels) {
+    if (const int index = IndexOf(items, level + *name); index >= 0) return index;
+  }
+  std::vector<std::string> names;
+  for (const T& item : items) names.push_back(item.name);
+  yaml->Error(node, path + " = " + Describe(node) + ": there is no such " + kind,
+              DidYouMean(*name, names));
+  return -1;
+}
+
 /// The joint that a name means in a block: its index. Empty after a finding, and without one for
 /// joints that were refused.
 std::optional<int> FindJointNamed(const ModelJoints& joints, const Block& block,

@@ -229,6 +229,41 @@ std::optional<Pose> ModelValues::PoseOf(const Block& block, const YamlNode& node
   return good ? std::optional<Pose>(pose) : std::nullopt;
 }
 
+std::optional<std::vector<std::pair<double, double>>> ModelValues::Pairs(const Block& block,
+                                                                         const YamlNode& node,
+                                                                         const std::string& path,
+                                                                         const UnitSuffix& unit) {
+  const auto items = yaml_.Items(node, path);
+  if (!items) return std::nullopt;
+  std::vector<std::pair<double, double>> pairs;
+  for (size_t i = 0; i < items->size(); ++i) {
+    const std::string at = fmt::format("{}[{}]", path, i);
+    const auto two = yaml_.Items(*(*items)[i], at, 2);
+    if (!two) return std::nullopt;
+    const auto a = Number(block, *(*two)[0], at + "[0]", unit);
+    const auto b = Number(block, *(*two)[1], at + "[1]");
+    if (!a || !b) return std::nullopt;
+    pairs.emplace_back(*a, *b);
+  }
+  return pairs;
+}
+
+std::optional<std::vector<std::pair<double, double>>> ModelValues::Points(const Block& block,
+                                                                          const YamlNode& node,
+                                                                          const std::string& path,
+                                                                          const UnitSuffix& unit) {
+  auto points = Pairs(block, node, path, unit);
+  if (!points) return std::nullopt;
+  for (size_t i = 1; i < points->size(); ++i) {
+    if ((*points)[i].first > (*points)[i - 1].first) continue;
+    yaml_.Error(*node.items[i], fmt::format("{}[{}]: the first numbers must increase", path, i));
+    return std::nullopt;
+  }
+  if (points->size() >= 2) return points;
+  yaml_.Error(node, path + " has fewer than two points");
+  return std::nullopt;
+}
+
 std::optional<CoordinateRange> ModelValues::Range(const Block& block, const YamlNode& node,
                                                   const std::string& path, const UnitSuffix& unit) {
   CoordinateRange range;

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/types.h"
@@ -97,6 +98,17 @@ class ModelValues {
   /// [lower, upper], null for none.
   std::optional<CoordinateRange> Range(const Block& block, const YamlNode& node,
                                        const std::string& path, const UnitSuffix& unit);
+
+  /// [[a, b], …], the a in a unit.
+  std::optional<std::vector<std::pair<double, double>>> Pairs(const Block& block,
+                                                              const YamlNode& node,
+                                                              const std::string& path,
+                                                              const UnitSuffix& unit);
+  /// Points of a curve: pairs whose a increase, at least two.
+  std::optional<std::vector<std::pair<double, double>>> Points(const Block& block,
+                                                               const YamlNode& node,
+                                                               const std::string& path,
+                                                               const UnitSuffix& unit);
 
   [[nodiscard]] YamlReader& yaml() { return yaml_; }
 

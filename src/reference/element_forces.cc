@@ -69,9 +69,9 @@ double ForceOf(const StopLaw& law, const AlongElement& at) {
   return in.side * Push(law, in);
 }
 
-// Force, slope and the integral of the force from the first knot.
 struct OnCurve {
-  double force = 0.0, slope = 0.0, integral = 0.0;
+  double force = 0.0, slope = 0.0;
+  double integral = 0.0;  // of the force from the knot before, on the first straight piece behind
 };
 // Hermite's polynomials between two knots [Fritsch, Carlson 1980, eq. 2].
 OnCurve Between(const CurveLaw::Knot& a, const CurveLaw::Knot& b, double x) {
@@ -93,17 +93,18 @@ OnCurve Straight(const CurveLaw::Knot& from, double slope, double x) {
 }
 OnCurve CurveAt(const CurveLaw& law, double x) {
   const std::vector<CurveLaw::Knot>& knots = law.knots;
-  if (x <= knots.front().at) return Straight(knots.front(), knots.front().slope_before, x);
-  double sum = 0.0;
-  for (size_t i = 1; i < knots.size(); ++i) {
-    OnCurve at = Between(knots[i - 1], knots[i], std::min(x, knots[i].at));
-    at.integral += sum;
-    if (x <= knots[i].at) return at;
-    sum = at.integral;
+  const auto next = std::ranges::upper_bound(knots, x, {}, &CurveLaw::Knot::at);
+  if (next == knots.begin()) return Straight(knots.front(), knots.front().slope_before, x);
+  if (next == knots.end()) return Straight(knots.back(), knots.back().slope_after, x);
+  return Between(*(next - 1), *next, x);
+}
+// ∫ F from the first knot.
+double IntegralTo(const CurveLaw& law, double x) {
+  double sum = CurveAt(law, x).integral;
+  for (size_t i = 1; i < law.knots.size() && law.knots[i].at <= x; ++i) {
+    sum += Between(law.knots[i - 1], law.knots[i], law.knots[i].at).integral;
   }
-  OnCurve at = Straight(knots.back(), knots.back().slope_after, x);
-  at.integral += sum;
-  return at;
+  return sum;
 }
 double ForceOf(const CurveLaw& law, const AlongElement& at) {
   return at.engaged * CurveAt(law, law.of_rate ? at.rate : at.position).force;
@@ -135,7 +136,7 @@ void AddEnergy(const StopLaw& law, const AlongElement& at, Energies* energy) {
   energy->springs += Elastic(law, in) * in.depth / (law.exponent + 1.0);
 }
 void AddEnergy(const CurveLaw& law, const AlongElement& at, Energies* energy) {
-  if (!law.of_rate) energy->springs -= CurveAt(law, at.position).integral;
+  if (!law.of_rate) energy->springs -= IntegralTo(law, at.position);
 }
 
 void AddPower(const DampingLaw& law, const AlongElement& at, Powers* power) {

@@ -44,7 +44,7 @@ Mechanism Loaded(const std::string& text, const std::map<std::string, double>& o
   return result.mechanism.value_or(Mechanism{});
 }
 
-TEST(ScaraModel, HasFourFreedomsAndNoRedundantConstraint) {
+TEST(ScaraModel, HasFourDegreesOfFreedomAndNoRedundantConstraint) {
   const Mobility mobility = AnalyseMobility(Loaded(ModelText()));
   EXPECT_EQ(mobility.body_coordinates, 78);
   EXPECT_EQ(mobility.constraint_rows, 74);

@@ -25,7 +25,7 @@ TEST(TimeLeft, CountsFromTheFirstCallAndFromEachFall) {
   EXPECT_EQ(left.Text(0.1, 71.0), "about 90 s left");
 }
 
-TEST(TimeLeft, IsReportedInUnitsThatPeopleUse) {
+TEST(TimeLeft, IsReportedInSuitableUnits) {
   EXPECT_EQ(TimeText(12.4), "12 s");
   EXPECT_EQ(TimeText(180.0), "3 min");
   EXPECT_EQ(TimeText(9000.0), "2.5 h");

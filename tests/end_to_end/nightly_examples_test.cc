@@ -181,7 +181,7 @@ TEST(NightlyExamples, EveryCallUsesOptionsThatThereAre) {
   EXPECT_GE(calls, 10U);
 }
 
-TEST(NightlyExamples, ALostScenarioFailsEveryNight) {
+TEST(NightlyExamples, ALostScenarioFailsEveryRun) {
   for (const char* name : {"github-nightly.yml", "gitlab-nightly.yml", "Jenkinsfile", "crontab",
                            "mbverify-nightly.service", "slurm-array.sh"}) {
     const std::string text = ReadAll(kNightly + name);
@@ -236,11 +236,11 @@ TEST(NightlyExamples, CronIsSilentWhenGreenOnly) {
   line = std::regex_replace(line, std::regex("/usr/local/bin/mbverify"), "./regression");
   for (const int code : {0, 1, 3}) {
     std::ofstream(mbverify.folder() / "regression")
-        << "#!/bin/sh\necho 'one drifted'\necho 'talk' >&2\nexit " << code << "\n";
+        << "#!/bin/sh\necho 'one drifted'\necho 'diagnostics' >&2\nexit " << code << "\n";
     fs::permissions(mbverify.folder() / "regression", fs::perms::owner_all);
     const ProgramResult result = mbverify.Script(line);
     EXPECT_EQ(result.err, "");
-    EXPECT_EQ(result.out, code == 0 ? "" : "one drifted\ntalk\n") << code;
+    EXPECT_EQ(result.out, code == 0 ? "" : "one drifted\ndiagnostics\n") << code;
   }
 }
 

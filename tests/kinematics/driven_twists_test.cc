@@ -32,7 +32,7 @@ TEST(DrivenTwists, APrescribedSliderIsNotMovedByDrives) {
   EXPECT_NEAR(Speed(twists, 1, 2), 1.0, 1e-12);  // the base moves both
 }
 
-TEST(DrivenTwists, TwoDrivesOnOneFreedomShareItAndLeaveThePrescribedBaseAtRest) {
+TEST(DrivenTwists, TwoDrivesOnOneDofShareItAndLeaveThePrescribedBaseAtRest) {
   Mechanism m = test::DrivenSliders();
   m.drives = {m.drives[1], m.drives[1]};
   m.prescribed = {{"base", 0}};

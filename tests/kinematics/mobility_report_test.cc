@@ -91,7 +91,7 @@ TEST(MobilityReport, ABallAtBothEndsLetsTheRodSpin) {
             std::string::npos);
 }
 
-TEST(MobilityReport, TheStewartPlatformHasSixFreedomsAndNothingRedundant) {
+TEST(MobilityReport, TheStewartPlatformHasSixDegreesOfFreedomAndNothingRedundant) {
   const MobilityReport report = ReportMobility(Shipped("stewart"));
   EXPECT_EQ(report.dofs(), 6);
   EXPECT_EQ(report.loops.size(), 6u);
@@ -137,7 +137,7 @@ TEST(MobilityReport, ADriveInItsDeadCentreHoldsNothingAtHomeOnly) {
   EXPECT_FALSE(report.home_singular());
 }
 
-TEST(MobilityReport, TwoMotorsOnOneFreedomAreNamedTogether) {
+TEST(MobilityReport, TwoMotorsOnOneDofAreNamedTogether) {
   Mechanism m = Shipped("four_bar");
   m.drives.push_back({.name = "second", .kind = JointDrive{m.FindJoint("D"), 0}, .range = {}});
   const MobilityReport report = ReportMobility(m);

@@ -108,7 +108,7 @@ TEST(CommandRank, WhatHardlyDiffersFromOthersIsTakenWhereNothingBetterIsPreferre
   EXPECT_EQ(chosen({0, 0, 3}).chosen, (std::vector<size_t>{0, 2}));
 }
 
-TEST(Mobility, TwoMotorsOnOneFreedomFightEachOther) {
+TEST(Mobility, TwoMotorsOnOneDofFightEachOther) {
   Mechanism m = MakeFourBar();
   m.drives.push_back({.name = "second", .kind = JointDrive{2, 0}, .range = {}});
   const Mobility mobility = AnalyseMobility(m);
@@ -158,7 +158,7 @@ TEST(Mobility, TheStabilizingPlatformHasTwoRedundantConstraintsPerLimb) {
   EXPECT_TRUE(without.drives_not_unique.empty());
 }
 
-TEST(Mobility, TheTripodHasThreeFreedomsAndNoRedundancy) {
+TEST(Mobility, TheTripodHasThreeDegreesOfFreedomAndNoRedundancy) {
   const LoadResult loaded = LoadModel(SourcePath("/models/spr_tripod/model.yaml"));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mobility mobility = AnalyseMobility(*loaded.mechanism);
@@ -237,8 +237,8 @@ TEST(Ranks, SparseEliminationAndSingularValuesGiveTheSameOnEveryShippedModel) {
 }
 
 // A floating body with 110 hinged ones: coordinates are chosen by lengths in this basis.
-TEST(Ranks, MotionsOfManyFreedomsAreOrthonormal) {
-  constexpr int kBodies = 110, kFreedoms = 6 + kBodies;
+TEST(Ranks, MotionsOfManyDegreesOfFreedomAreOrthonormal) {
+  constexpr int kBodies = 110, kDof = 6 + kBodies;
   std::vector<Eigen::Triplet<double>> entries;
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
@@ -254,10 +254,10 @@ TEST(Ranks, MotionsOfManyFreedomsAreOrthonormal) {
   ASSERT_TRUE(SparseRank(J, internal::kRankTolerance).clear());
   const auto found = internal::FindRank(J, internal::NullSpaces::kMotion);
   EXPECT_EQ(found.rank, 5 * kBodies);
-  ASSERT_EQ(found.motion.cols(), kFreedoms);
+  ASSERT_EQ(found.motion.cols(), kDof);
   EXPECT_LT((J * found.motion).norm(), 1e-11);
   const MatX product = found.motion.transpose() * found.motion;
-  EXPECT_LT((product - MatX::Identity(kFreedoms, kFreedoms)).norm(), 1e-12);
+  EXPECT_LT((product - MatX::Identity(kDof, kDof)).norm(), 1e-12);
 }
 
 TEST(Ranks, WithoutAClearGapSingularValuesDecide) {

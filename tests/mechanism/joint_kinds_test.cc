@@ -21,7 +21,7 @@ class JointKinds : public testing::TestWithParam<JointKindRow> {
                .range = {}};
 };
 
-TEST_P(JointKinds, HaveACoordinatePerFreedomThatMovesAsItsLetterSays) {
+TEST_P(JointKinds, HaveACoordinatePerDegreeOfFreedomThatMovesAsItsLetterSays) {
   ASSERT_EQ(UnitTwists(joint_, Mat3::Identity(), Mat3::Identity()).cols(), DofsOf(joint_.kind));
   for (int c = 0; c < DofsOf(joint_.kind); ++c) {
     std::array<double, 6> q{};

@@ -11,7 +11,7 @@ namespace mbv::fixtures {
 ///   τ = (J + J_r n²) q̈ + m g r cos q + c q̇ + F0 + k1 x + k2 x² + k3 x³
 ///       + (Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇,  x = q − q0
 /// `linear`: only what MuJoCo itself has.
-struct RubbingPendulum {
+struct PendulumWithFriction {
   static constexpr double m = 1.3, r = 0.21, I = 0.012, g = 9.81;
   double damping = 0.07;
   double free = 0.4, preload = 0.9, k1 = 2.5, k2 = -0.3, k3 = 0.11;
@@ -69,11 +69,12 @@ struct RubbingPendulum {
 /// The pendulum's body on a journal with friction whose axis is not level: weight along it is not a
 /// load.
 struct JournalPendulum {
-  static constexpr double m = RubbingPendulum::m, r = RubbingPendulum::r, g = RubbingPendulum::g;
+  static constexpr double m = PendulumWithFriction::m, r = PendulumWithFriction::r,
+                          g = PendulumWithFriction::g;
   double coefficient = 0.15, radius = 0.04;
 
   [[nodiscard]] Mechanism Make() const {
-    Mechanism mechanism = RubbingPendulum().Make();
+    Mechanism mechanism = PendulumWithFriction().Make();
     mechanism.gravity_W = Vec3(0, -g, -5.0);
     mechanism.elements = {{.name = "journal",
                            .joint = 0,
@@ -93,7 +94,7 @@ struct JournalPendulum {
     const double s = std::sin(q), c = std::cos(q);
     const double x = r * (-rate * rate * c - acceleration * s);
     const double y = g + r * (-rate * rate * s + acceleration * c);
-    return (RubbingPendulum::I + m * r * r) * acceleration + m * g * r * c +
+    return (PendulumWithFriction::I + m * r * r) * acceleration + m * g * r * c +
            std::copysign(coefficient * radius * m * std::hypot(x, y), rate);
   }
   /// At an even rate: weight, and friction by weight and centrifugal force.

@@ -86,7 +86,7 @@ TEST(Weld, OpenEdgesAreCountedAndSmallGapsAreClosed) {
   EXPECT_EQ(welded.vertices.size(), 8U);
 }
 
-TEST(Weld, PartsThatDoNotTouchAreTold) {
+TEST(Weld, PartsThatDoNotTouchAreReported) {
   const TriangleMesh two =
       test::Together(BoxMesh(1, 1, 1), Moved(BoxMesh(1, 2, 1), At(Vec3(5, 0, 0))));
   const std::vector<TriangleMesh> parts = PartsOf(two);

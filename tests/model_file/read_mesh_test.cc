@@ -69,7 +69,7 @@ TEST(ReadMesh, DaeIsInItsUnitAndItsNodesPlaceButKeepsItsAxes) {
   }
 }
 
-TEST(ReadMesh, WhatIsNotAMeshIsTold) {
+TEST(ReadMesh, WhatIsNotAMeshIsReported) {
   EXPECT_NE(ReadMeshBytes("solid", ".stl").trouble, "");
   EXPECT_NE(ReadMeshBytes("", ".obj").trouble, "");
   EXPECT_NE(ReadMeshBytes(std::string(200, '\xff'), ".stl").trouble, "");

@@ -67,7 +67,7 @@ TEST(StabilizingPlatformModel, KeepsTheNamesAndOrderOfItsDrives) {
   EXPECT_EQ(m.bodies[m.FindBody("ship_roll")].mass, 0.0);
 }
 
-TEST(StabilizingPlatformModel, HasSixFreedomsOnTheShipAndTwoRedundantConstraintsPerLimb) {
+TEST(StabilizingPlatformModel, HasSixDegreesOfFreedomOnTheShipAndTwoRedundantConstraintsPerLimb) {
   const Mobility mobility = AnalyseMobility(LoadShipped("stabilizing_platform"));
   EXPECT_EQ(mobility.dofs, 6 + 3);  // and the ship's three
   EXPECT_EQ(mobility.redundant, 6);
@@ -115,7 +115,7 @@ TEST(SprTripodModel, LegAxesFollowThePrintedAzimuths) {
   }
 }
 
-TEST(SprTripodModel, HasThreeFreedomsAndNothingRedundant) {
+TEST(SprTripodModel, HasThreeDegreesOfFreedomAndNothingRedundant) {
   const Mobility mobility = AnalyseMobility(LoadShipped("spr_tripod"));
   EXPECT_EQ(mobility.dofs, 3);
   EXPECT_EQ(mobility.redundant, 0);

@@ -163,7 +163,7 @@ TEST(FigureLayout, AStatedHeightIsKept) {
   EXPECT_NEAR(LayOut(figure, FigureStyles()[0]).height, PointsOf(100), 1e-9);
 }
 
-TEST(FigureFonts, ChineseIsThereAndWhatNoFontHasIsTold) {
+TEST(FigureFonts, ChineseIsThereAndWhatNoFontHasIsReported) {
   Figure figure = TwoPanels();
   figure.panels[0].y.label = "驱动力 *F* (N)";
   EXPECT_FALSE(LacksGlyphs(figure, FigureStyles()[0]));

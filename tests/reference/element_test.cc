@@ -19,23 +19,23 @@ Motion Swinging(const Mechanism& m) {
 }
 
 TEST(ReferenceElements, TorqueIsThatOfTheEquationOfMotion) {
-  const RubbingPendulum pendulum;
+  const PendulumWithFriction pendulum;
   const Mechanism m = pendulum.Make();
   const ReferenceRun run = RunReference(m, Swinging(m));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_LT(TorqueError(run.trace, pendulum), 1e-12);
   // Every number counts.
-  using P = RubbingPendulum;
+  using P = PendulumWithFriction;
   for (double P::*number : {&P::damping, &P::free, &P::preload, &P::k1, &P::k2, &P::k3, &P::rotor,
                             &P::ratio, &P::coulomb, &P::breakaway, &P::stribeck}) {
-    RubbingPendulum perturbed = pendulum;
+    PendulumWithFriction perturbed = pendulum;
     perturbed.*number *= 1.0 + 1e-6;
     EXPECT_GT(TorqueError(run.trace, perturbed), 1e-10);
   }
 }
 
 TEST(ReferenceElements, AreNoReactionsAndBalanceThePower) {
-  const Mechanism m = RubbingPendulum().Make();
+  const Mechanism m = PendulumWithFriction().Make();
   const ReferenceRun run = RunReference(m, Swinging(m));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const double power = ColumnOf(run.trace, "power.input").cwiseAbs().maxCoeff();
@@ -47,7 +47,7 @@ TEST(ReferenceElements, AreNoReactionsAndBalanceThePower) {
 }
 
 TEST(ReferenceElements, EnergiesAreThoseByHand) {
-  const RubbingPendulum p;
+  const PendulumWithFriction p;
   const Mechanism m = p.Make();
   const ReferenceRun run = RunReference(m, Swinging(m));
   for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
@@ -67,7 +67,7 @@ TEST(ReferenceElements, EnergiesAreThoseByHand) {
 
 // J q̈ + m g r cos q + c q̇ + spring = 0, and the energy goes into the damper.
 TEST(ReferenceElements, FreeMotionObeysTheEquationOfMotion) {
-  RubbingPendulum p;
+  PendulumWithFriction p;
   p.coulomb = p.breakaway = 0.0;
   const Mechanism m = p.Make();
   const ForwardRun run = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 2.0));
@@ -86,7 +86,7 @@ TEST(ReferenceElements, FreeMotionObeysTheEquationOfMotion) {
 
 // Turns round exactly at t = 0.5 s: there the torque is known up to the breakaway torque.
 TEST(ReferenceElements, DryFrictionAtRestLeavesABand) {
-  RubbingPendulum p;
+  PendulumWithFriction p;
   const Mechanism m = p.Make();
   const Profile profile{{SineTerm{1.0, 0.5, 0}}};
   const ReferenceRun run = RunReference(m, DriveMotion(m, {profile}, 1.0, 0.05));
@@ -95,7 +95,7 @@ TEST(ReferenceElements, DryFrictionAtRestLeavesABand) {
   for (Eigen::Index i = 0; i < band.size(); ++i) {
     EXPECT_NEAR(band[i], i == 10 ? 0.6 : 0.0, 1e-12) << i;
   }
-  RubbingPendulum smooth = p;
+  PendulumWithFriction smooth = p;
   smooth.coulomb = smooth.breakaway = 0.0;
   const double q = At(run.trace, 10, "motor.position");
   EXPECT_NEAR(At(run.trace, 10, "motor.force"),
@@ -104,7 +104,7 @@ TEST(ReferenceElements, DryFrictionAtRestLeavesABand) {
 }
 
 TEST(ReferenceElements, APrescribedJointThatRestsHasABand) {
-  const Mechanism m = RubbingPendulum().Prescribed();
+  const Mechanism m = PendulumWithFriction().Prescribed();
   Motion hold{.duration_s = 1.0, .sample_s = 0.5, .commands = {}, .loads = {}};
   hold.commands = {Commanded("base", Coordinate::Kind::kPrescribed, 0, 0, {{ConstantTerm{0.3}}})};
   const ReferenceRun run = RunReference(m, hold);
@@ -114,7 +114,7 @@ TEST(ReferenceElements, APrescribedJointThatRestsHasABand) {
 
 // Swings out and comes to rest: at every sample friction is that of the load that the accelerations
 // of this very sample make.
-TEST(ReferenceElements, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
+TEST(ReferenceElements, FrictionOfAFreeJournalIsByTheLoadOfItsAccelerations) {
   const JournalPendulum p{.coefficient = 0.6};
   const Mechanism m = p.Make();
   const ForwardRun run = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 8.0));
@@ -176,7 +176,7 @@ TEST(ReferenceElements, FreeFrictionByLoadWithoutASolutionIsRefused) {
   EXPECT_EQ(run.summary.stop, Stop::kSingular) << run.summary.message;
   EXPECT_EQ(run.summary.where, "journal");
   EXPECT_EQ(run.summary.time_s, 0.0);
-  const double J = RubbingPendulum::I + p.m * p.r * p.r;
+  const double J = PendulumWithFriction::I + p.m * p.r * p.r;
   EXPECT_NEAR(run.summary.amount, p.coefficient * p.radius * p.m * p.r / J, 1e-12);
   const Mechanism shared = JournalPendulum().OnTwoHinges();
   const ForwardRun two = RunForwardReference(shared, FreeMotion(shared, 0.3, 5.0, 1.0));
@@ -239,7 +239,7 @@ TEST(ReferenceElements, FrictionByLoadIsThatOfAPushedBlock) {
   }
 }
 
-TEST(ReferenceElements, AJournalRubsByItsRadialLoadOnly) {
+TEST(ReferenceElements, FrictionOfAJournalIsByItsRadialLoadOnly) {
   const JournalPendulum p;
   const Mechanism m = p.Make();
   const Profile even{{ConstantTerm{0.2}, RampTerm{.rate = -3.0}}};

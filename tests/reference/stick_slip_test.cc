@@ -282,7 +282,7 @@ TEST(StickSlip, ABlockOnACommandedBeltRidesUntilItsForceBreaksItAway) {
 
 // A machine of one DOF q with friction in some coordinates, whose rates are k_e(q) q̇:
 //   J q̈ + ½ J' q̇² + V' + Σ F_e |k_e| sign q̇ = 0,  F_e = Fc or μ N_e(q, q̇, q̈, sign).
-struct OneFreedom {
+struct OneDof {
   using Function = std::function<double(double)>;
   struct Friction {
     double force = 0.0;
@@ -399,12 +399,12 @@ void AddDryFriction(Mechanism* m, int joint, double force) {
 }
 
 /// The crank-rocker of FourBar with friction in these joints (A, B, D, C) [N m].
-OneFreedom RubbingFourBar(const std::array<double, 4>& torque, Mechanism* m) {
+OneDof FourBarWithFriction(const std::array<double, 4>& torque, Mechanism* m) {
   *m = MakeFourBar();
-  OneFreedom truth{.J = [](double q) { return FourBar(q).J(); },
-                   .V = [](double q) { return FourBar(q).V(); },
-                   .frictions = {}};
-  const std::array<OneFreedom::Function, 4> k = {
+  OneDof truth{.J = [](double q) { return FourBar(q).J(); },
+               .V = [](double q) { return FourBar(q).V(); },
+               .frictions = {}};
+  const std::array<OneDof::Function, 4> k = {
       [](double) { return 1.0; }, [](double q) { return FourBar(q).k2() - 1.0; },
       [](double q) { return FourBar(q).k3(); },
       [](double q) { return FourBar(q).k3() - FourBar(q).k2(); }};
@@ -462,7 +462,7 @@ struct Boxer {
     return load;
   }
 
-  [[nodiscard]] OneFreedom Truth() const {
+  [[nodiscard]] OneDof Truth() const {
     const double n = sliders;
     return {
         .J =
@@ -516,14 +516,14 @@ struct Followed {
   double position = 0.0, rate = 0.0, energy = 0.0;
   int passed = 0, stopped = 0;
 };
-Followed Against(const OneFreedom& truth, const ForwardRun& run, double step_s) {
+Followed Against(const OneDof& truth, const ForwardRun& run, double step_s) {
   EXPECT_TRUE(run.summary.ok()) << run.summary.message << " " << run.summary.time_s;
   Followed off;
   const VecX q = ColumnOf(run.trace, "motor.position"), v = ColumnOf(run.trace, "motor.velocity"),
              taken = ColumnOf(run.trace, "dampers.work"),
              energy = ColumnOf(run.trace, "energy.kinetic") +
                       ColumnOf(run.trace, "energy.gravity") - taken;
-  const std::vector<OneFreedom::At> samples =
+  const std::vector<OneDof::At> samples =
       truth.Follow({q[0], v[0]}, run.trace.time_s, step_s, &off.passed, &off.stopped);
   const double fastest = v.cwiseAbs().maxCoeff(), least = taken.minCoeff();
   const auto raise = [](double* most, double by) { *most = by <= *most ? *most : by; };
@@ -542,7 +542,7 @@ struct Start {
 };
 
 // The reference follows the equation of motion, and not that with a thousandth more friction.
-void ExpectFollowed(const OneFreedom& truth, const Mechanism& m, const Start& start) {
+void ExpectFollowed(const OneDof& truth, const Mechanism& m, const Start& start) {
   const ForwardRun run = RunForwardReference(m, FreeMotion(m, start.q, start.v, start.duration_s));
   const Followed off = Against(truth, run, 4e-5);
   EXPECT_LT(off.position, kMachine);
@@ -550,8 +550,8 @@ void ExpectFollowed(const OneFreedom& truth, const Mechanism& m, const Start& st
   EXPECT_LT(off.energy, kMachine);
   EXPECT_GE(off.passed, start.passes);
   EXPECT_GE(off.stopped, start.stops);
-  OneFreedom more = truth;
-  for (OneFreedom::Friction& friction : more.frictions) {
+  OneDof more = truth;
+  for (OneDof::Friction& friction : more.frictions) {
     friction.force *= 1.001;
     if (!friction.by_load) continue;
     friction.by_load = [load = friction.by_load](double q, double v, double a, int sign) {
@@ -571,7 +571,7 @@ TEST(DeadCentre, ACrankRockerWithFrictionInItsJointsFollowsItsEquationOfMotion) 
                                       {all, {1.0, 9.0, 2.5, 4, 2}}}) {
     SCOPED_TRACE(testing::Message() << torque[0] << " " << torque[2] << " " << start.v);
     Mechanism m;
-    const OneFreedom truth = RubbingFourBar(torque, &m);
+    const OneDof truth = FourBarWithFriction(torque, &m);
     ExpectFollowed(truth, m, start);
   }
 }
@@ -588,7 +588,7 @@ TEST(DeadCentre, SlidersWithFrictionInTheirGuidesFollowTheirEquationOfMotion) {
                                         << start.q << " " << start.v);
         const Boxer boxer{.sliders = sliders};
         Mechanism m = boxer.Make(start.q);
-        OneFreedom truth = boxer.Truth();
+        OneDof truth = boxer.Truth();
         for (int n = 0; n < sliders * elements; ++n) {
           const double force = 0.15 + 0.05 * n;
           AddDryFriction(&m, Boxer::Guide(n % sliders), force);
@@ -602,14 +602,14 @@ TEST(DeadCentre, SlidersWithFrictionInTheirGuidesFollowTheirEquationOfMotion) {
 
 // Guides with friction by what they bear as well: at the dead centre both turn at once, by the
 // loads of the motion that goes on.
-TEST(DeadCentre, SlidersThatRubByTheirLoadsFollowTheirEquationOfMotion) {
+TEST(DeadCentre, SlidersWithFrictionByTheirLoadsFollowTheirEquationOfMotion) {
   for (const int sliders : {1, 2}) {
     for (const Start& start :
          {Start{1.0, 0.0, 0.9, 0, sliders == 1 ? 1 : 0}, Start{1.0, 14.0, 0.4, 1, 0}}) {
       SCOPED_TRACE(testing::Message() << sliders << " sliders from " << start.v);
       const Boxer boxer{.sliders = sliders};
       Mechanism m = boxer.Make(start.q);
-      OneFreedom truth = boxer.Truth();
+      OneDof truth = boxer.Truth();
       const double force = 0.1, coefficient = 0.03;
       for (int s = 0; s < sliders; ++s) {
         AddDryFriction(&m, Boxer::Guide(s), force);
@@ -627,7 +627,7 @@ TEST(DeadCentre, SlidersThatRubByTheirLoadsFollowTheirEquationOfMotion) {
 
 // A slider that rests at its dead centre is not held there: it slides as soon as the motor begins
 // to turn the crank, however late.
-TEST(DeadCentre, ASliderThatRestsThereRubsOnceTheMotorTurns) {
+TEST(DeadCentre, ASliderAtRestThereHasFrictionOnceTheMotorTurns) {
   const double force = 0.5;
   Mechanism m = Boxer{}.Make(0.0);
   m.gravity_W.setZero();

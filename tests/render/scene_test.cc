@@ -63,7 +63,7 @@ TEST(CameraFit, TouchesTheMarginsAndCrossesNone) {
   }
 }
 
-TEST(CameraFit, LooksWhereItIsTold) {
+TEST(CameraFit, LooksAtTheGivenPoint) {
   const std::vector<Vec3> points = {Vec3(1, 0, 0), Vec3(0, 0, 1)};
   const Mat3 R_DW = UprightRotation(Vec3(0, -9.81, 0));
   const CameraView view{

@@ -53,7 +53,7 @@ TEST(MobilityText, JsonIsAsWritten) {
   ExpectGolden("mobility.json", MobilityJson(Sliders(), Counts()));
 }
 
-TEST(MobilityText, SpinsBetweenTwoBallsAreTold) {
+TEST(MobilityText, SpinsBetweenTwoBallsAreReported) {
   MobilityReport report = Counts();
   report.home.idle_spins = {"leg1", "leg2"};
   report.spins_not_idle = {"rod: output 'o' shows its turn"};
@@ -66,7 +66,7 @@ TEST(MobilityText, SpinsBetweenTwoBallsAreTold) {
   }
 }
 
-TEST(MobilityText, ASingularHomeAndOnesThatHoldNothingAreTold) {
+TEST(MobilityText, ASingularHomeAndOnesThatHoldNothingAreReported) {
   MobilityReport report = Counts();
   report.home.dofs = 4;
   EXPECT_NE(MobilityText(Sliders(), report)

@@ -168,7 +168,7 @@ TEST(Report, CsvGivesTheEndsOfABandAndNoMiddle) {
   EXPECT_NE(last.find(",nan,-5.5,9.5,"), std::string::npos) << last;
 }
 
-TEST(Report, SamplesAtRestAreTold) {
+TEST(Report, SamplesAtRestAreReported) {
   synthetic::Case c = PerturbedCase();
   Trace& trace = c.simulated;
   trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));

@@ -51,7 +51,7 @@ std::string Joined(const std::vector<std::string>& lines) {
   return text;
 }
 
-TEST(Sizing, SamplesAtRestAreTold) {
+TEST(Sizing, SamplesAtRestAreReported) {
   Report report = Sized("a", 3.2, 0.8);
   report.motor_loads[0].samples_at_rest = 1;
   const std::string reported = "friction rests at 1 of 2 samples: the worse end of the band counts";

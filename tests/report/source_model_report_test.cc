@@ -49,7 +49,7 @@ TEST(SourceModelReport, TheCauseThatTakesTheErrorWithItIsNamed) {
   EXPECT_NE(CauseSentence(audit).find("No single thing"), std::string::npos);
 }
 
-TEST(SourceModelReport, WhatStaysWithAllMendedIsNotAMatterOfSettings) {
+TEST(SourceModelReport, WhatStaysWithAllCorrectedIsNotAMatterOfSettings) {
   SourceModelAudit audit = Example();
   EXPECT_EQ(CauseSentence(audit).find("another mechanism"), std::string::npos);
   audit.corrected.force = 0.05;

@@ -43,7 +43,7 @@ TEST(ScenarioDocument, ItsTableHoldsEveryCheckWithItsDefaults) {
     const std::string line =
         fmt::format("| `{}` | {}{} | {:.0e}, {:.0e}, {:.0e} |\n", row.key, row.title, unit,
                     *row.limits.forward, *row.limits.inverse, *row.limits.reference);
-    const std::string plain = test::AsPeopleWrite(line);
+    const std::string plain = test::AsPlainText(line);
     EXPECT_NE(document.find(plain), std::string::npos) << plain;
   }
 }

@@ -52,7 +52,7 @@ TEST(TableTimes, EventsAreLeftOutAndTheRestStaysOnItsGrid) {
   EXPECT_TRUE(said);
 }
 
-TEST(TableTimes, ALateStartIsReportedWithTheOffsetThatMendsIt) {
+TEST(TableTimes, ALateStartIsReportedWithTheOffsetThatCorrectsIt) {
   const Loaded loaded = LoadTable("t,d1.force\n3.5,1\n3.6,2\n3.7,3\n3.8,5\n3.9,4\n");
   ASSERT_NE(loaded.table, nullptr) << loaded.text;
   Motion motion;

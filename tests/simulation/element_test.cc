@@ -11,7 +11,7 @@
 namespace mbv {
 namespace {
 
-using fixtures::RubbingPendulum;
+using fixtures::PendulumWithFriction;
 
 // Through several turns: 0.2 + 3 t + 7 sin 2t.
 RunSummary SwingAt(double t, DrivenSample* driven) {
@@ -34,7 +34,7 @@ void ExpectBalanced(const SimulationRun& run, double tolerance) {
 
 TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
   for (const bool linear : {true, false}) {
-    RubbingPendulum pendulum;
+    PendulumWithFriction pendulum;
     pendulum.linear = linear;
     const Mechanism m = pendulum.Make();
     for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
@@ -44,7 +44,7 @@ TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
       EXPECT_TRUE(run.warnings.empty());
       EXPECT_LT(fixtures::TorqueError(run, SwingAt, pendulum), forward ? 1e-7 : 1e-12) << linear;
       ExpectBalanced(run, forward ? 1e-6 : 1e-12);
-      RubbingPendulum perturbed = pendulum;
+      PendulumWithFriction perturbed = pendulum;
       perturbed.preload *= 1.0 + 1e-3;
       EXPECT_GT(fixtures::TorqueError(run, SwingAt, perturbed), 1e-6);
     }
@@ -52,7 +52,7 @@ TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
 }
 
 TEST(SimulatedElements, DryFrictionAtRestLeavesABand) {
-  RubbingPendulum p;
+  PendulumWithFriction p;
   const Mechanism m = p.Make();
   for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
     const SimulationRun run = Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = mode});
@@ -60,7 +60,7 @@ TEST(SimulatedElements, DryFrictionAtRestLeavesABand) {
     const VecX band = run.trace.values.col(run.trace.Find("motor.force.band"));
     EXPECT_LT((band.array() - p.breakaway).abs().maxCoeff(), 1e-12);
     const VecX middle = run.trace.values.col(run.trace.Find("motor.force"));
-    RubbingPendulum smooth = p;
+    PendulumWithFriction smooth = p;
     smooth.coulomb = smooth.breakaway = 0.0;
     EXPECT_LT((middle.array() - smooth.Torque(0.3, 0.0, 0.0)).abs().maxCoeff(), 1e-6);
     EXPECT_LT(run.trace.values.col(run.trace.Find("power.dampers")).cwiseAbs().maxCoeff(), 1e-12);
@@ -70,7 +70,7 @@ TEST(SimulatedElements, DryFrictionAtRestLeavesABand) {
 }
 
 TEST(SimulatedElements, APrescribedJointThatRestsHasABand) {
-  const Mechanism m = RubbingPendulum().Prescribed();
+  const Mechanism m = PendulumWithFriction().Prescribed();
   const SimulationRun run =
       Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = DriveMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -94,7 +94,7 @@ TEST(SimulatedElements, FrictionByASharedLoadIsRefused) {
   }
 }
 
-TEST(SimulatedElements, AJournalRubsByItsRadialLoadOnly) {
+TEST(SimulatedElements, FrictionOfAJournalIsByItsRadialLoadOnly) {
   const fixtures::JournalPendulum p;
   const Mechanism m = p.Make();
   for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
@@ -145,7 +145,7 @@ TEST(SimulatedElements, FrictionByLoadIsThatOfAPushedBlock) {
 
 // MuJoCo has these on joints; the file states them, a preload as a moved free position.
 TEST(SimulatedElements, TheFileCarriesWhatMuJoCoHasAndNamesWhatItLacks) {
-  RubbingPendulum pendulum;
+  PendulumWithFriction pendulum;
   const std::string all = WriteMjcf(pendulum.Make());
   EXPECT_NE(all.find("damping=\"0.07\""), std::string::npos) << all;
   EXPECT_NE(all.find("armature=\"0.03675"), std::string::npos) << all;

@@ -228,7 +228,7 @@ TEST(Mjcf, AMasslessBodyInALoopGetsATinyMass) {
   EXPECT_NE(compiled.mjcf.find("massless in the mechanism"), std::string::npos);
 }
 
-TEST(Mjcf, AnyClosingJointIsRepresentedWithItsOwnFreedoms) {
+TEST(Mjcf, AnyClosingJointIsRepresentedWithItsOwnDegreesOfFreedom) {
   // A hinge that closes the loop is kept as a hinge, between two welded halves of the rocker.
   const Compiled compiled(fixtures::MakeFourBar());
   const mjModel& m = *compiled.engine.m;

@@ -209,7 +209,7 @@ TEST(Inverse, AnImpossibleInertiaIsSteppedAsItIs) {
             1e-4 * possible.cwiseAbs().maxCoeff());
 }
 
-TEST(Inverse, RefusesUndrivenFreedoms) {
+TEST(Inverse, RefusesUndrivenDegreesOfFreedom) {
   Mechanism m = fixtures::MakeFourBar();
   m.joints.pop_back();  // open chain: coupler and rocker swing freely
   const SimulationRun run = Simulate(m, OneSecond(), SwingDrive, {.mode = DriveMode::kInverse});

@@ -227,7 +227,7 @@ TEST(SimulatedStickSlip, FrictionByLoadIsThatOfThePushedBlock) {
   EXPECT_GT(Apart(SlipFreely(perturbed, motion), reference, "leg.position"), 1e-6);
 }
 
-TEST(SimulatedStickSlip, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
+TEST(SimulatedStickSlip, FrictionOfAFreeJournalIsByTheLoadOfItsAccelerations) {
   const fixtures::JournalPendulum p;
   const Mechanism m = p.Make();
   const Motion motion = StackedBlocks::From(m, 0.3, 5.0, 4.0);

@@ -48,7 +48,9 @@ ModelDrives DrivesOf(const std::string& word) {
                            : ModelDrives::kHeld;
 }
 
-bool IsForPeople(const std::string& format) { return FormatOf(format) == ModelFormat::kMobility; }
+bool IsMobilityReport(const std::string& format) {
+  return FormatOf(format) == ModelFormat::kMobility;
+}
 
 // What --json writes, as --format json prints it.
 std::string WithHead(const JsonOption& json, const std::string& text) {
@@ -108,7 +110,7 @@ int Model(const ModelArguments& arguments) {
     exit_code = format == ModelFormat::kUrdf
                     ? WriteUrdfFiles(arguments.out, text, loaded, inputs.files())
                     : WriteWholeFile(arguments.out, text, inputs.files());
-  } else if (IsForPeople(arguments.format)) {
+  } else if (IsMobilityReport(arguments.format)) {
     SayText(arguments.json.text(), text);
   } else {
     fmt::print(arguments.json.text(), "{}", text);

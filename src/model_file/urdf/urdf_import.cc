@@ -75,7 +75,7 @@ std::string UrdfModelText(const std::string& file, const std::string& urdf) {
 namespace mbv {
 namespace {
 
-// urdfdom talks through console_bridge; while this lives, its words become findings.
+// urdfdom reports through console_bridge; while this lives, its messages become findings.
 class LogCapture : public console_bridge::OutputHandler {
  public:
   LogCapture(std::string file, Diagnostics* diagnostics)

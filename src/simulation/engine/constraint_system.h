@@ -127,8 +127,8 @@ class ConstraintSystem {
 
   /// Friction by the joints' loads that force() balances, per force element; empty: none.
   void SetLoadFriction(const VecX& size) { load_friction_ = size; }
-  /// Share of its force with which a force element acts (Switch), per element; empty: all 1.
-  void SetEngaged(std::vector<double> share) { engaged_ = std::move(share); }
+  /// Share of its force with which a force element acts (Switch), at a time.
+  void SetEngaged(const Motion& motion, double t_s) { EvaluateSwitches(motion, t_s, &engaged_); }
   [[nodiscard]] double engaged(size_t element) const {
     return element < engaged_.size() ? engaged_[element] : 1.0;
   }

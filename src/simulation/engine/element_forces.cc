@@ -313,9 +313,11 @@ double SpringPowerOf(const ForceElement& element, const ElementMotion& at) {
   return stores ? PowerOf(element, at) : 0.0;
 }
 
-double LostPowerOf(const ForceElement& element, const ElementMotion& at) {
-  if (std::holds_alternative<RotorLaw>(element.law)) return 0.0;
-  return PowerOf(element, at) - SpringPowerOf(element, at);
+bool Dissipates(const ForceElement& element) {
+  const auto* curve = std::get_if<CurveLaw>(&element.law);
+  return std::holds_alternative<DampingLaw>(element.law) ||
+         std::holds_alternative<FrictionLaw>(element.law) ||
+         std::holds_alternative<StopLaw>(element.law) || (curve != nullptr && curve->of_rate);
 }
 
 double BreakawayAt(const ForceElement& element, const ElementMotion& at) {

@@ -82,9 +82,10 @@ struct ElementMotion {
 
 /// What an element puts in [W].
 [[nodiscard]] double PowerOf(const ForceElement& element, const ElementMotion& at);
-/// Of that, what comes from springs, and what is taken out of the mechanism for good (<= 0).
+/// Of that, what comes from springs.
 [[nodiscard]] double SpringPowerOf(const ForceElement& element, const ElementMotion& at);
-[[nodiscard]] double LostPowerOf(const ForceElement& element, const ElementMotion& at);
+/// True if the rest of it is taken out of the mechanism for good.
+[[nodiscard]] bool Dissipates(const ForceElement& element);
 
 /// What elements exchange with the motion.
 struct ElementEnergy {

@@ -201,14 +201,14 @@ VecX OnlyDof(const ConstraintSystem& system) {
 HeldShares::HeldShares(Session* session) : s_(*session) {
   const int rows = s_.system.friction_rows();
   if (rows < 2 || s_.system.sliding().empty()) return;
-  const VecX freedom = OnlyDof(s_.system);
-  if (freedom.size() == 0) return;
+  const VecX direction = OnlyDof(s_.system);
+  if (direction.size() == 0) return;
   const auto force = Forces(&s_);
   double load = 0.0;
   int held = 0;
   for (int row = 0; row < rows; ++row) {
     if (s_.system.HeldLoss(row) > 0.0) ++held;
-    load += s_.system.FrictionJacobian(row).dot(freedom) * force[row];
+    load += s_.system.FrictionJacobian(row).dot(direction) * force[row];
   }
   if (held < 2) return;
   found_ = s_.system.force();
@@ -218,17 +218,17 @@ HeldShares::HeldShares(Session* session) : s_(*session) {
     load_friction_[static_cast<Eigen::Index>(e)] = s_.system.load_friction(e);
   }
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    const double change = Share(freedom, load);
+    const double change = Share(direction, load);
     if (change <= kSharesSettled * held_.cwiseAbs().maxCoeff()) return;
     if (!s_.loaded.empty()) s_.system.SetLoadFriction(LoadFrictionOf(&s_));
   }
 }
 
 // By the present breakaway forces; how much that changes what friction exerts.
-double HeldShares::Share(const VecX& freedom, double load) {
+double HeldShares::Share(const VecX& direction, double load) {
   double most = 0.0;
   for (int row = 0; row < held_.size(); ++row) {
-    const double rate = s_.system.FrictionJacobian(row).dot(freedom);
+    const double rate = s_.system.FrictionJacobian(row).dot(direction);
     most += s_.system.HeldLoss(row) * std::abs(rate);
   }
   if (most == 0.0) return 0.0;
@@ -237,7 +237,7 @@ double HeldShares::Share(const VecX& freedom, double load) {
   VecX tau = VecX::Zero(s_.system.nv());  // what the loops take over
   for (int row = 0; row < held_.size(); ++row) {
     const VecX gradient = s_.system.FrictionJacobian(row);
-    force[row] = std::copysign(s_.system.HeldLoss(row), gradient.dot(freedom)) * load / most;
+    force[row] = std::copysign(s_.system.HeldLoss(row), gradient.dot(direction)) * load / most;
     tau += (held_[row] - force[row]) * gradient;
   }
   s_.solver.SolveForcesHere(tau);

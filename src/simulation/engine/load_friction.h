@@ -62,7 +62,7 @@ class HeldShares {
   HeldShares& operator=(const HeldShares&) = delete;
 
  private:
-  [[nodiscard]] double Share(const VecX& freedom, double load);
+  [[nodiscard]] double Share(const VecX& direction, double load);
 
   Session& s_;
   VecX found_, held_;   // constraint forces, of friction

@@ -57,7 +57,10 @@ void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates) 
     (*rates)[driven + 1] -= engine.mechanism->springs[s].damping * rate * rate;
   }
   for (size_t e = 0; e < engine.elements.size(); ++e) {
-    (*rates)[driven + 1] += LostPowerOf(engine.mechanism->elements[e], ElementMotionOf(system, e));
+    const ForceElement& element = engine.mechanism->elements[e];
+    if (!Dissipates(element)) continue;
+    const ElementMotion at = ElementMotionOf(system, e);
+    (*rates)[driven + 1] += PowerOf(element, at) - SpringPowerOf(element, at);
   }
 }
 

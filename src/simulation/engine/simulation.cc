@@ -155,10 +155,7 @@ VecX HomePositions(const EngineModel& engine) {
 
 void Session::EvaluateLoads(double t_s) {
   loads.Evaluate(t_s, *data);
-  if (motion.switches.empty()) return;
-  CommandSample now;
-  EvaluateMotion(motion, t_s, &now);
-  system.SetEngaged(std::move(now.engaged));
+  system.SetEngaged(motion, t_s);
 }
 
 void Session::ApplyForces(double t_s, const Commanded& at) {

@@ -62,7 +62,7 @@ TEST(Converge, ItsBytesDoNotDependOnTheNumberOfJobs) {
   }
 }
 
-TEST(Converge, ARunWhoseProcessIsKilledIsTold) {
+TEST(Converge, ARunWhoseProcessIsKilledIsReported) {
   ConvergeOptions options{.steps_s = {4e-3, 2e-3, 1e-3, 5e-4}, .jobs = 2};
   options.scenario.set = {{"motion.duration_s", "0.4"}, {"snapshots.times_s", "[]"}};
   options.progress = [here = getpid()](const std::string& what, double) {

@@ -74,7 +74,7 @@ TEST(ConvergenceReport, TextTableAndJsonAreAsWritten) {
   ExpectGolden("converge.json", Rounded(json).dump(2) + "\n");
 }
 
-TEST(ConvergenceReport, ForcesThatCannotBeExtrapolatedAreTold) {
+TEST(ConvergenceReport, ForcesThatCannotBeExtrapolatedAreReported) {
   ConvergenceReport report = WithEverything();
   report.extrapolation.fine_s = kNan;
   report.extrapolation.pass = false;

@@ -84,7 +84,7 @@ PreparedMap MapOfScara() {
   return {*std::move(prepared), *std::move(map)};
 }
 
-TEST(KilledJobs, RowsOfAStiffnessMapThatWereKilledAreEmptyAndTold) {
+TEST(KilledJobs, RowsOfAStiffnessMapThatWereKilledAreEmptyAndReported) {
   const PreparedMap at = MapOfScara();
   const MapResult whole = ComputeMap(at.prepared, at.map, {}, 2);
   Killer kill;

@@ -33,7 +33,7 @@ UpgradeReport ExampleUpgrade() {
                       .why_new = "diverged"}}};
 }
 
-TEST(UpgradeReport, IsReadByPeople) {
+TEST(UpgradeReport, IsPlainText) {
   EXPECT_EQ(
       ToText(ExampleUpgrade()),
       "bar/turn: the generated model in MuJoCo 2.2.2 and 3.14.0\n"

@@ -31,7 +31,7 @@ scara_robot::StiffnessParameters Scara() {
   return scara_robot::StiffnessParametersOf(stiffness_audit::LoadElastic(kModels, "scara_robot"));
 }
 
-TEST(StiffnessAudit, CabinsEquationsAreRightOrMended) {
+TEST(StiffnessAudit, CabinsEquationsAreRightOrCorrected) {
   const auto rows = cabin_audit::StiffnessRows(kModels, Cabin());
   EXPECT_EQ(With(rows, AuditVerdict::kOk),
             (std::set<std::string>{"(54)", "(55)", "(62)–(64), (66)–(68)", "(69)–(75)"}));

@@ -702,7 +702,7 @@ TEST_F(SolverRows, NameTheOnesThatFail) {
   EXPECT_LT(Worst(forces.row(6).transpose(), expected.row(6).transpose()), 1e-9);
 }
 
-TEST_F(SolverRows, EndWhenTheyAreToldTo) {
+TEST_F(SolverRows, EndOnRequest) {
   MatX drives;
   Eigen::Index reported = 0;
   const BatchStatus status = solver_.CloseRows(q_, &drives, 1, [&](Eigen::Index done) {

@@ -98,7 +98,7 @@ TEST_F(SourceModelAudits, InWhichNothingIsWrongIsReportedSo) {
   EXPECT_EQ(audit.integrator, "RK4");
 }
 
-TEST_F(SourceModelAudits, SoftLoopsOpenAreNamedAndMendedByTheLines) {
+TEST_F(SourceModelAudits, SoftLoopsOpenAreNamedAndCorrectedByTheLines) {
   const std::string text = Text({.head = kSoft});
   const SourceModelAudit audit = Audit(text);
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
@@ -170,7 +170,7 @@ TEST_F(SourceModelAudits, ServosThatLagAreNamedAndNoSettingIsBlamed) {
   EXPECT_TRUE(audit.Good(audit.bare));
 }
 
-TEST_F(SourceModelAudits, WhatCutsAServosCommandOrForceIsTold) {
+TEST_F(SourceModelAudits, WhatCutsAServosCommandOrForceIsReported) {
   const auto servo = [](const char* range) {
     return Text({.head = kStiff,
                  .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", range)});

@@ -199,7 +199,7 @@ TEST(StructuralFaults, CarriedRotorsAndBushingsAreTurnedRound) {
   EXPECT_EQ(std::get<RotorLaw>(wrong.elements.back().law).ratio, -12.0);
 }
 
-TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {
+TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndDegreesOfFreedomAppear) {
   for (const std::string& model : ShippedModelNames()) {
     const Mechanism mechanism = LoadNamed(model);
     const Mobility whole = AnalyseMobility(mechanism);

@@ -360,7 +360,7 @@ TEST(VerifyCommand, ProgramsOfStrangersRunOnlyWhereTheyAreTrusted) {
 }
 
 // An archive may hold more than it is made of, and its manifest may name it.
-TEST(VerifyCommand, ASurplusResultIsTold) {
+TEST(VerifyCommand, ASurplusResultIsReported) {
   const Packed packed = FourBar("surplus");
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
   const ProgramResult more = packed.Edited("add RESULTS/more.csv honest");

@@ -20,7 +20,7 @@ TEST(TablesCommand, WritesLatexAndMarkdownAndReportsIt) {
   EXPECT_FALSE(std::filesystem::exists(folder + "parameters.md"));
 }
 
-TEST(TablesCommand, ADisagreementIsWrittenAndTold) {
+TEST(TablesCommand, ADisagreementIsWrittenAndReported) {
   const Program mbverify("tables_disagree");
   const ProgramResult run = mbverify(
       "tables scenarios/four_bar/turn_inverse.yaml --only checks --set checks.force_nrmse=1e-30 "

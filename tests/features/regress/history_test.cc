@@ -72,7 +72,7 @@ TEST_F(HistoryTest, TenTimesWorseInsideItsLimitIsDriftWithTheRunItBegan) {
   EXPECT_NE(DriftsOf(sixth)[0].since.find("build 0123abcd"), std::string::npos);
 }
 
-TEST_F(HistoryTest, AFiveTimesWorseNightIsNotADrift) {
+TEST_F(HistoryTest, AFiveTimesWorseRunIsNotADrift) {
   for (int i = 0; i < 4; ++i) Record(1e-9);
   EXPECT_TRUE(DriftsOf(Record(5e-9)).empty());
 }

@@ -65,7 +65,7 @@ TEST_F(PublishingTest, AResultThatCannotTakeItsPlaceIsExitCode2) {
   EXPECT_EQ(Read("out/m/agree/traces.csv"), "measured on the rig");
 }
 
-TEST_F(PublishingTest, ScenariosNamedLikeFilesOfTheNightAreRefused) {
+TEST_F(PublishingTest, ScenariosNamedLikeFilesOfTheRunAreRefused) {
   options_.history = "out/history.sqlite";
   options_.shared_files["report-0123456789abcdef.js"] = "script";
   for (const std::string name :
@@ -125,7 +125,7 @@ TEST_F(PublishingTest, OutputsThatAreScenariosAreRefused) {
 
 // Each result whole: of the regression before or of this one. Where both are in the folder, or
 // results are newer than the summaries, it says so and is not joined with others.
-TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
+TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextRunIsFine) {
   Scenario("agree1");
   Scenario("agree2");
   options_.jobs = 1;
@@ -260,7 +260,7 @@ TEST_F(PublishingTest, AHistoryThatFillsTheDiskIsExitCode2ButTheSummariesAreTher
   EXPECT_TRUE(fs::exists("out/regress.json"));
 }
 
-TEST_F(PublishingTest, FoldersThatCannotBeReadAreReportedAndTheNightGoesOn) {
+TEST_F(PublishingTest, FoldersThatCannotBeReadAreReportedAndTheRunGoesOn) {
   Scenario("agree");
   fs::create_directories("scenarios/locked");
   fs::permissions("scenarios/locked", fs::perms::none);

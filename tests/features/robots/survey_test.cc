@@ -194,7 +194,7 @@ joints:
 drives: {m: {kind: joint, joint: A}, n: {kind: joint, joint: D}}
 )";
 
-TEST(DefaultSetup, EveryFreedomGetsOneDrive) {
+TEST(DefaultSetup, EveryDegreeOfFreedomGetsOneDrive) {
   const LoadResult loaded = LoadModelText(kRod, "rod.yaml");
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   std::vector<std::string> notes;

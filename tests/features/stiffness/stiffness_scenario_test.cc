@@ -143,7 +143,7 @@ colour: red
   }
 }
 
-TEST_F(StiffnessScenarioText, TheNumberOfCoordinatesIsThatOfTheFreedoms) {
+TEST_F(StiffnessScenarioText, TheNumberOfCoordinatesIsThatOfTheDegreesOfFreedom) {
   const std::string text = FindingsOf(std::string(kMinimal) + "pose: {platform.x: 0}\n");
   EXPECT_NE(text.find("pose gives 1 coordinates, but scara_robot has 4 degrees of freedom"),
             std::string::npos)
@@ -188,7 +188,7 @@ TEST_F(StiffnessScenarioText, TheDocumentsExampleLoadsAndItsTableHoldsTheDefault
   for (const MetricRow& row : StiffnessMetricRows()) {
     std::string line = fmt::format("| `{}` | {} | {:.0e} | {:.0e} |\n", row.key, row.title,
                                    *row.limits.forward, *row.limits.reference);
-    const std::string plain = test::AsPeopleWrite(line);
+    const std::string plain = test::AsPlainText(line);
     EXPECT_NE(document.find(plain), std::string::npos) << plain;
   }
 }
