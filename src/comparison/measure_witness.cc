@@ -256,7 +256,9 @@ bool NearBreak(const Trace& trace, Eigen::Index i) {
   const double h = trace.time_s[1] - trace.time_s[0];
   const double from = trace.time_s[static_cast<size_t>(i - kReach)] - kTimesOff * h;
   const double to = trace.time_s[static_cast<size_t>(i + kReach)] + kTimesOff * h;
-  return std::ranges::any_of(trace.breaks_s, [&](double t) { return from <= t && t <= to; });
+  return std::ranges::any_of(trace.events, [&](const MotionEvent& event) {
+    return event.jumps() && from <= event.time_s && event.time_s <= to;
+  });
 }
 
 // The largest within reach of the formulas.

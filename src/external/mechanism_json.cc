@@ -224,6 +224,8 @@ class Writer {
                  {"radius", law.radius}};
     if (std::isfinite(law.length)) json["length"] = law.length;
     if (law.thrust_radius > 0.0) json["thrust_radius"] = law.thrust_radius;
+    if (law.skew != 0.0) json["skew"] = law.skew;
+    if (law.resists != 0) json["resists"] = law.resists > 0 ? "positive" : "negative";
     if (law.coupling >= 0) json["coupling"] = m_.couplings[static_cast<size_t>(law.coupling)].name;
     return json;
   }

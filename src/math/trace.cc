@@ -119,6 +119,13 @@ ChannelColumns::ChannelColumns(const std::vector<Channel>& channels) {
   }
 }
 
+const char* ToText(Happening what) {
+  constexpr std::array<const char*, 8> kWords = {"rests",        "slides up",  "slides down",
+                                                 "switched off", "free",       "at upper end",
+                                                 "at lower end", "passes knot"};
+  return kWords.at(static_cast<size_t>(what));
+}
+
 int Trace::Find(const std::string& name) const {
   for (size_t i = 0; i < channels.size(); ++i) {
     if (channels[i].name == name) return static_cast<int>(i);

@@ -103,6 +103,28 @@ class ChannelColumns {
   std::array<std::vector<int>, static_cast<size_t>(Quantity::kCount_)> columns_;
 };
 
+/// What a force element does from an instant on, in a motion by forces.
+enum class Happening {
+  kRests,        ///< dry friction: accelerations jump
+  kSlidesUp,     ///< towards larger values of its coordinate
+  kSlidesDown,   ///< towards smaller ones
+  kSwitchedOff,  ///< a brake, a clutch
+  kFree,         ///< a stop
+  kUpperEnd,
+  kLowerEnd,
+  kKnot  ///< a curve, beyond one of its corners
+};
+struct MotionEvent {
+  double time_s = kNan;
+  std::string element = {};
+  Happening what = Happening::kRests;
+
+  /// True where accelerations jump.
+  [[nodiscard]] bool jumps() const { return what <= Happening::kSwitchedOff; }
+};
+
+[[nodiscard]] const char* ToText(Happening what);
+
 /// Samples of channels on a common time grid. Witnesses sample at the same times, so traces are
 /// compared without interpolation.
 struct Trace {
@@ -110,8 +132,8 @@ struct Trace {
   std::vector<double> time_s;     ///< n sample times [s], increasing
   std::vector<Channel> channels;  ///< m channels
   MatX values;                    ///< n × m
-  /// Times [s] at which accelerations jump because dry friction stops or starts, increasing.
-  std::vector<double> breaks_s = {};
+  /// Between the samples, in the order of their times.
+  std::vector<MotionEvent> events = {};
 
   /// Column of the channel with this name, or -1.
   [[nodiscard]] int Find(const std::string& name) const;

@@ -362,22 +362,33 @@ struct RotorLaw {
 ///   S = μ (r |F_n| + r_t |a·F|),  with two bearings at ±ℓ/2 along a, which share F_n and M,
 ///   S = μ (r |F_n/2 + M × a/ℓ| + r |F_n/2 − M × a/ℓ| + r_t |a·F|);                            (1)
 /// of a ball S = μ r |F| about each axis; of a coupling S = μ |Q|, Q its force along the
-/// coordinate.
+/// coordinate, beside which ε Q acts at any rate: what drives the coupling gives (1 + μ + ε) |Q|,
+/// what it drives gets (1 − μ + ε) |Q|. A freewheel resists one sign of the rate only: the other
+/// feels nothing, and at rest the force lies between 0 and Fs against that sign.
 struct FrictionLaw {
   double coulomb = 0.0;        ///< Fc [N or N m], >= 0
   double breakaway = 0.0;      ///< Fs, >= Fc
   double stribeck_rate = 1.0;  ///< vs [m/s or rad/s] >= 0; 0: all that slides feels Fc
   double coefficient = 0.0;    ///< μ >= 0; 0: no friction by load
+  double skew = 0.0;           ///< ε of a coupling, |ε| <= μ
   double radius = 1.0;         ///< r of a journal or ball [m], > 0; 1 along lengths
   double length = std::numeric_limits<double>::infinity();  ///< ℓ [m], > 0
   double thrust_radius = 0.0;  ///< r_t of the collar that bears the thrust [m], >= 0
   int coupling = -1;           ///< whose force it follows instead, index
+  int resists = 0;             ///< sign of the only rate that it resists; 0: both
 
   [[nodiscard]] bool by_load() const { return coefficient > 0.0; }
   /// The most that S grows with a force [m or 1].
   [[nodiscard]] double per_load() const {
     return coefficient * (coupling >= 0 ? 1.0 : std::max(radius, thrust_radius));
   }
+  /// What of Fc and Fs acts at a sign of the rate, towards smaller coordinates; at rest the middle
+  /// of what may act.
+  [[nodiscard]] double sense(int sign) const {
+    return resists == 0 ? sign : sign == 0 ? 0.5 * resists : sign == resists ? sign : 0;
+  }
+  /// Half the width of what may act at rest, by Fs alone.
+  [[nodiscard]] double half_band() const { return resists == 0 ? breakaway : 0.5 * breakaway; }
 };
 
 /// What acts beyond the ends of a way, and pushes back only: with the depth δ = q − upper (or lower

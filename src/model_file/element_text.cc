@@ -47,7 +47,11 @@ std::string TextOf(const FrictionLaw& law) {
     text += fmt::format(", breakaway: {}", law.breakaway);
     if (law.stribeck_rate != 0.0) text += fmt::format(", stribeck_rate: {}", law.stribeck_rate);
   }
-  return law.coefficient == 0.0 ? text : text + fmt::format(", coefficient: {}", law.coefficient);
+  if (law.resists != 0) text += law.resists > 0 ? ", resists: positive" : ", resists: negative";
+  if (law.coefficient == 0.0) return text;
+  text += fmt::format(", coefficient: {}", law.coefficient + law.skew);
+  if (law.skew == 0.0) return text;
+  return text + fmt::format(", coefficient_back: {}", law.coefficient - law.skew);
 }
 
 }  // namespace

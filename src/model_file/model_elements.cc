@@ -36,7 +36,8 @@ const std::vector<std::string>& KeysOf(const std::string& kind) {
       {"bushing", {"parent", "child", "stiffness", "damping"}},
       {"friction",
        {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius", "radius_mm", "length",
-        "length_mm", "thrust_radius", "thrust_radius_mm", "coupling", "efficiency"}}};
+        "length_mm", "thrust_radius", "thrust_radius_mm", "coupling", "efficiency",
+        "efficiency_back", "coefficient_back", "resists"}}};
   return keys.at(kind);
 }
 
@@ -445,10 +446,11 @@ std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlM
 
 std::optional<FrictionLaw> ElementReader::ReadFriction(const Block& block, const YamlMap& map,
                                                        const ForceElement* element) {
-  const bool geared = map.Has("coupling") || map.Has("efficiency");
+  const bool geared = map.Has("coupling") || map.Has("efficiency") || map.Has("efficiency_back") ||
+                      map.Has("coefficient_back");
   const bool loaded = geared || map.Has("coefficient");
   auto law = ReadDry(block, map, loaded);
-  if (!law || element == nullptr) return std::nullopt;
+  if (!ReadResists(map, loaded, law ? &*law : nullptr) || element == nullptr) return std::nullopt;
   if (geared) return ReadGearLoss(block, map, *element, &*law) ? law : std::nullopt;
   return ReadBearings(block, map, *element, &*law) ? law : std::nullopt;
 }
@@ -482,19 +484,52 @@ bool ElementReader::ReadGearLoss(const Block& block, const YamlMap& map,
                "force, 1/efficiency − 1");
     return false;
   }
-  if (map.Has("coefficient")) {
-    const auto coefficient = NotNegative(block, map, "coefficient");
-    law->coefficient = coefficient.value_or(0.0);
-    return coefficient.has_value();
-  }
-  const auto efficiency = values_.Positive(block, map, "efficiency", {kPlain});
-  if (efficiency && *efficiency > 1.0) {
-    yaml.Error(*map.Find("efficiency"), fmt::format("{} = {} violates efficiency <= 1",
-                                                    map.PathOf("efficiency"), *efficiency));
+  const bool by_efficiency = map.Has("efficiency");
+  const char* back = by_efficiency ? "efficiency_back" : "coefficient_back";
+  if (const char* other = by_efficiency ? "coefficient_back" : "efficiency_back"; map.Has(other)) {
+    yaml.Error(*map.Find(other), fmt::format("{} goes with {}", map.PathOf(other),
+                                             by_efficiency ? "coefficient" : "efficiency"));
     return false;
   }
-  if (efficiency) law->coefficient = 1.0 / *efficiency - 1.0;
-  return efficiency.has_value();
+  const auto at_most_one = [&](const char* key, std::optional<double> value) {
+    if (!value || *value <= 1.0) return value;
+    yaml.Error(*map.Find(key),
+               fmt::format("{} = {} violates {} <= 1", map.PathOf(key), *value, key));
+    return std::optional<double>();
+  };
+  std::optional<double> drives, driven;
+  if (by_efficiency) {
+    drives = at_most_one("efficiency", values_.Positive(block, map, "efficiency", {kPlain}));
+    if (drives) drives = 1.0 / *drives - 1.0;
+  } else {
+    drives = NotNegative(block, map, "coefficient");
+  }
+  driven = drives;
+  if (map.Has(back)) {
+    driven = NotNegative(block, map, back);
+    if (by_efficiency) driven = at_most_one(back, driven);
+    if (driven && by_efficiency) driven = 1.0 - *driven;
+  }
+  if (!drives || !driven) return false;
+  law->coefficient = 0.5 * (*drives + *driven);
+  law->skew = 0.5 * (*drives - *driven);
+  return true;
+}
+
+// Freewheels resist one way, whatever they bear.
+bool ElementReader::ReadResists(const YamlMap& map, bool loaded, FrictionLaw* law) {
+  const YamlNode* node = map.Find("resists");
+  if (node == nullptr) return law != nullptr;
+  YamlReader& yaml = values_.yaml();
+  if (loaded) {
+    yaml.Error(*node, fmt::format("{} has no meaning with friction by load", map.PathOf("resists")),
+               "a second element beside it may resist one way");
+    return false;
+  }
+  const auto word = yaml.Choice(*node, map.PathOf("resists"), {"positive", "negative"});
+  if (!word || law == nullptr) return false;
+  law->resists = *word == "positive" ? 1 : -1;
+  return true;
 }
 
 // How the joint bears its load. Only of these joints it is said what does.

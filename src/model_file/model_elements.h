@@ -77,6 +77,7 @@ class ElementReader {
                     FrictionLaw* law);
   bool ReadGearLoss(const Block& block, const YamlMap& map, const ForceElement& element,
                     FrictionLaw* law);
+  bool ReadResists(const YamlMap& map, bool loaded, FrictionLaw* law);
   std::optional<std::vector<double>> ReadPolynomial(const Block& block, const YamlMap& map,
                                                     const ForceElement* element);
   std::optional<double> NotNegative(const Block& block, const YamlMap& map, const std::string& key,

@@ -248,7 +248,8 @@ void WarnAboutFriction(const Mechanism& mechanism, ModelReport* report) {
   constexpr double kMost = 2.0;  // rubber on rough ground stays below
   for (const ForceElement& element : mechanism.elements) {
     const auto* friction = std::get_if<FrictionLaw>(&element.law);
-    if (friction == nullptr || !(friction->coefficient > kMost)) continue;
+    if (friction == nullptr || friction->coupling >= 0) continue;
+    if (!(friction->coefficient > kMost)) continue;
     report->AtFile(Severity::kWarning,
                    fmt::format("elements.{}: friction coefficient {:.4g}, more than any pair of "
                                "materials has",

@@ -98,11 +98,13 @@ ForceAndSlope Vary(const CurveLaw& law, const Varying& at) {
           (a.slope_after + 2.0 * u * c2 + u * (2.0 * w + u) * c3) * dx};
 }
 ForceAndSlope Vary(const FrictionLaw& law, const Varying& at) {
-  if (law.stribeck_rate == 0.0) return {-at.sign * law.coulomb, 0.0};
+  const double sense = law.sense(at.sign);
+  if (at.sign == 0) return {-sense * law.breakaway, 0.0};
+  if (law.stribeck_rate == 0.0) return {-sense * law.coulomb, 0.0};
   const double slowness = at.rate / law.stribeck_rate;
   const double drop = (law.breakaway - law.coulomb) * std::exp(-slowness * slowness);
-  return {-at.sign * (law.coulomb + drop),
-          at.sign * drop * 2.0 * slowness / law.stribeck_rate * at.d_rate};
+  return {-sense * (law.coulomb + drop),
+          sense * drop * 2.0 * slowness / law.stribeck_rate * at.d_rate};
 }
 
 }  // namespace

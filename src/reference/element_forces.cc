@@ -40,7 +40,8 @@ double ForceOf(const RotorLaw& law, const AlongElement& at) {
 }
 
 double ForceOf(const FrictionLaw& law, const AlongElement& at) {
-  const double sense = -at.friction_sign * at.engaged;
+  const double sense = -law.sense(at.friction_sign) * at.engaged;
+  if (at.friction_sign == 0) return sense * law.breakaway;
   if (law.stribeck_rate == 0.0) return sense * law.coulomb;
   const double slowness = at.rate / law.stribeck_rate;
   return sense * (law.coulomb + (law.breakaway - law.coulomb) * std::exp(-slowness * slowness));
@@ -257,7 +258,7 @@ std::vector<VecX> RestingWrenches(const Mechanism& mechanism, const BodyStates& 
   if (friction_signs.empty()) return wrenches;
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     if (friction_signs[e] != 0 || !HasFriction(mechanism.elements[e])) continue;
-    double most = states.Engaged(e) * std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
+    double most = states.Engaged(e) * std::get<FrictionLaw>(mechanism.elements[e].law).half_band();
     if (load_friction.size() > 0) most += load_friction[static_cast<Eigen::Index>(e)];
     wrenches.push_back(most *
                        GradientOf(ElementRow(mechanism, e, states), mechanism.bodies.size()));
@@ -270,8 +271,8 @@ double LoadFrictionLoss(const Mechanism& mechanism, const ReferenceSample& sampl
   const std::vector<ScalarRow> rows = ElementRows(mechanism, sample.states);
   double loss = 0.0;
   for (size_t e = 0; e < rows.size(); ++e) {
-    const double size = sample.load_friction[static_cast<Eigen::Index>(e)];
-    loss += sample.friction_signs[e] * size * RateOf(rows[e], sample.states.V_WB);
+    const double force = sample.load_force[static_cast<Eigen::Index>(e)];
+    loss -= force * RateOf(rows[e], sample.states.V_WB);
   }
   return loss;
 }
@@ -313,14 +314,6 @@ namespace {
 // The contraction shrinks errors by q per pass; where q is close to 1 round-off ends it first.
 constexpr int kMostPasses = 2000;
 constexpr double kSettled = 4.0 * kEps;
-
-double SizeIn(const LoadSystem& system, size_t e, const VecX& n) {
-  BearingLoad p = system.p[e];
-  for (size_t d = 0; d < system.p.size(); ++d) {
-    p -= system.P[e][d] * (system.sign[d] * system.per_load[d] * n[static_cast<Eigen::Index>(d)]);
-  }
-  return SizeOf(p);
-}
 
 }  // namespace
 
@@ -419,10 +412,19 @@ RunSummary LoadShared(const Mechanism& mechanism, size_t element) {
           .names_where = true};
 }
 
+void LoadSystem::Add(const Mechanism& mechanism, size_t element, const BodyStates& states,
+                     int friction_sign, const BearingLoad& without) {
+  p.push_back(without);
+  sign.push_back(friction_sign);
+  per_load.push_back(PerLoad(mechanism, element, states));
+  skew.push_back(states.Engaged(element) *
+                 std::get<FrictionLaw>(mechanism.elements[element].law).skew);
+}
+
 double LoadSystem::Raised(size_t e) const {
   double sum = 0.0;
   for (size_t d = 0; d < P[e].size(); ++d) {
-    sum += SizeOf(P[e][d]) * std::abs(sign[d]) * per_load[d];
+    sum += SizeOf(P[e][d]) * (std::abs(sign[d]) * per_load[d] + std::abs(skew[d]));
   }
   return sum;
 }
@@ -437,14 +439,20 @@ size_t LoadSystem::MostRaised() const {
 
 double LoadSystem::contraction() const { return P.empty() ? 0.0 : Raised(MostRaised()); }
 
-RunSummary LoadSystem::Solve(VecX* n) const {
-  n->setZero(static_cast<Eigen::Index>(p.size()));
+RunSummary LoadSystem::Solve(std::vector<BearingLoad>* v) const {
+  v->assign(p.size(), BearingLoad::Zero());
   const double q = contraction();
   for (int pass = 0; q < 1.0 && pass < kMostPasses; ++pass) {
-    const VecX last = *n;
-    for (size_t e = 0; e < p.size(); ++e)
-      (*n)[static_cast<Eigen::Index>(e)] = SizeIn(*this, e, last);
-    if ((*n - last).cwiseAbs().maxCoeff() <= kSettled * n->maxCoeff()) return RunSummary::Done();
+    const std::vector<BearingLoad> last = *v;
+    double change = 0.0, largest = 0.0;
+    for (size_t e = 0; e < p.size(); ++e) {
+      (*v)[e] = p[e];
+      for (size_t d = 0; d < p.size(); ++d) (*v)[e] += P[e][d] * Force(d, last[d]);
+      change = std::max(change, std::abs(SizeOf((*v)[e]) - SizeOf(last[e])));
+      change = std::max(change, skew[e] == 0.0 ? 0.0 : std::abs((*v)[e][6] - last[e][6]));
+      largest = std::max(largest, SizeOf((*v)[e]));
+    }
+    if (change <= kSettled * largest) return RunSummary::Done();
   }
   return {.stop = Stop::kSingular,
           .message = fmt::format(

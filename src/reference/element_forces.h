@@ -11,8 +11,8 @@
 //   M = −dh/dt = −J n (q̈ a + q̇ ω × a) on that body            E += J n q̇ a·ω                    (5)
 //   F = −J n² q̈ − J n a·ε                                                                       (6)
 //
-// At rest friction is taken as 0, the middle of what statics allows: |F| ≤ Fs. What friction by the
-// joint's load adds to (4), load_friction.h finds.
+// At rest friction is taken as the middle of what statics allows: 0 of |F| ≤ Fs, half of Fs of a
+// freewheel.
 #pragma once
 
 #include <functional>
@@ -67,14 +67,15 @@ struct ElementSlope {
 // Friction that grows with the joint's own reaction, or with a coupling's force. Internal to
 // reference/.
 //
-//   F_e = −c_e n_e sign q̇_e,  S = c n by (1) of FrictionLaw, c = FrictionLaw::per_load()       (1)
-// [Shigley, Mechanical Engineering Design, "Boundary-lubricated bearings"].
+//   F_e = −c_e |v_e| sign q̇_e + ε_e Q_e,  S = c |v| by (1) of FrictionLaw, c = per_load()       (1)
+// [Shigley, Mechanical Engineering Design, "Boundary-lubricated bearings"], with ε Q of couplings
+// alone, |v|: the sum of the lengths of the load's three parts.
 //
 // The reactions depend on the friction, linearly: with p_e the load without friction by load, and
 // P_ed the part of it per unit of force F_d,
-//   n_e = |p_e − Σ_d P_ed sign q̇_d c_d n_d|, |p|: the sum of the lengths of its three parts     (2)
+//   v_e = p_e + Σ_d P_ed F_d                                                                    (2)
 // which has one solution, and a fixed-point iteration that finds it, if
-//   q = max_e Σ_d |P_ed| c_d < 1                                                               (3)
+//   q = max_e Σ_d |P_ed| (c_d + |ε_d|) < 1                                                      (3)
 
 /// Indices of the elements with friction by load.
 [[nodiscard]] std::vector<size_t> LoadedElements(const Mechanism& mechanism);
@@ -98,13 +99,23 @@ using BearingLoad = Eigen::Matrix<double, 9, 1>;
 struct LoadSystem {
   std::vector<BearingLoad> p;               ///< per loaded element [N or N m]
   std::vector<std::vector<BearingLoad>> P;  ///< [e][d]
-  std::vector<double> sign, per_load;
+  std::vector<double> sign, per_load, skew;
 
+  /// Without P, which follows when all are known.
+  void Add(const Mechanism& mechanism, size_t element, const BodyStates& states, int friction_sign,
+           const BearingLoad& without);
   [[nodiscard]] double contraction() const;  ///< (3)
   /// The loaded element whose load the others raise most.
   [[nodiscard]] size_t MostRaised() const;
-  /// n_e [N or N m]; kSingular where (3) does not hold, with q.
-  [[nodiscard]] RunSummary Solve(VecX* n) const;
+  /// v_e [N or N m]; kSingular where (3) does not hold, with q.
+  [[nodiscard]] RunSummary Solve(std::vector<BearingLoad>* v) const;
+  /// S_e and F_e of a load v_e [N or N m].
+  [[nodiscard]] double Size(size_t e, const BearingLoad& v) const {
+    return per_load[e] * SizeOf(v);
+  }
+  [[nodiscard]] double Force(size_t e, const BearingLoad& v) const {
+    return skew[e] * v[6] - sign[e] * Size(e, v);
+  }
 
  private:
   [[nodiscard]] double Raised(size_t e) const;

@@ -368,7 +368,7 @@ RunSummary ForceSolver::CheckLoadsUnique(const ReferenceSample& sample,
   return RunSummary::Done();
 }
 
-// Eqs. 1 and 2 of load_friction.h.
+// Eqs. 1 and 2 of friction by loads, element_forces.h.
 RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample) {
   const std::vector<size_t> loaded = LoadedElements(mechanism_);
   sample->load_friction.resize(0);
@@ -383,9 +383,8 @@ RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample) {
     const size_t e = loaded[d];
     LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()));
     unit.col(static_cast<Eigen::Index>(d)) = -force_;
-    system.p.push_back(LoadOf(mechanism_, e, sample->states, reactions));
-    system.sign.push_back(sample->friction_signs[e]);
-    system.per_load.push_back(PerLoad(mechanism_, e, sample->states));
+    system.Add(mechanism_, e, sample->states, sample->friction_signs[e],
+               LoadOf(mechanism_, e, sample->states, reactions));
   }
   for (const size_t e : loaded) {
     std::vector<BearingLoad>& row = system.P.emplace_back();
@@ -394,14 +393,15 @@ RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample) {
           LoadOf(mechanism_, e, sample->states, ReactionsOf(unit.col(d), sample->states)));
     }
   }
-  VecX n;
-  if (RunSummary summary = system.Solve(&n); !summary.ok()) return summary;
+  std::vector<BearingLoad> v;
+  if (RunSummary summary = system.Solve(&v); !summary.ok()) return summary;
   sample->load_friction.setZero(static_cast<Eigen::Index>(mechanism_.elements.size()));
+  sample->load_force = sample->load_friction;
   for (size_t d = 0; d < loaded.size(); ++d) {
-    const auto k = static_cast<Eigen::Index>(d);
-    const double size = system.per_load[d] * n[k];
-    sample->load_friction[static_cast<Eigen::Index>(loaded[d])] = size;
-    force -= system.sign[d] * size * unit.col(k);
+    const auto e = static_cast<Eigen::Index>(loaded[d]);
+    sample->load_friction[e] = system.Size(d, v[d]);
+    sample->load_force[e] = system.Force(d, v[d]);
+    force += sample->load_force[e] * unit.col(static_cast<Eigen::Index>(d));
   }
   force_ = force;
   return RunSummary::Done();

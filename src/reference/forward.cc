@@ -153,7 +153,7 @@ RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
   run->steps = free.steps();
   run->evaluations = free.evaluations();
   run->singular = free.Crossings();
-  run->trace.breaks_s = free.friction_events();
+  run->trace.events = free.events();
   if (summary.ok() && options.measure_trust) {
     MeasureTrust(mechanism, motion, options, samples, run);
   }

@@ -277,7 +277,7 @@ void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const Mat
     // Where it holds nothing, any force moves it.
     rest_.most[static_cast<Eigen::Index>(k)] =
         std::max(states.Engaged(phase_.held[k]) *
-                     std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway,
+                     std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).half_band(),
                  std::numeric_limits<double>::min());
   }
 }

@@ -15,11 +15,11 @@
 // at rest, and the least change of R u puts poses and rates back there (rest_decision.h). Those
 // whose coordinate loops and commands prescribe have the direction of their rate.
 //
-// Friction by the joints' loads (load_friction.h) moves the DOFs, and they the loads: with u̇_0
+// Friction by the joints' loads (element_forces.h) moves the DOFs, and they the loads: with u̇_0
 // and reactions of the state without it, and g_d = Rᵀ∇q_d,
 //   u̇ = u̇_0 + Σ_d F_d a_d,  H a_d = g_d (what is held stays),                                  (4)
 //   p_e: load by A_p + R u̇_0,  P_ed: load by M R a_d − ∇q_d alone                             (5)
-// give eq. (2) there, which is solved as in commanded motion; held elements bear n_e, too.
+// give eq. (2) there, which is solved as in commanded motion; held elements bear v_e, too.
 #pragma once
 
 #include <Eigen/QR>
@@ -165,10 +165,11 @@ class FreeDynamics {
   [[nodiscard]] LoadSystem LoadsAt(double t_s, const ForceRows& at, const BodyStates& states,
                                    const MatX& R, MatX* along);
   void TakeLoads(const LoadSystem& system, const MatX& along, const RestSystem& without,
-                 const VecX& n);
+                 const std::vector<BearingLoad>& v);
   [[nodiscard]] RunSummary FollowHeld(double t_s, const ForceRows& loops, const BodyStates& states,
                                       const MatX& R, const VecX& A_p,
-                                      const std::function<void()>& take, VecX* n);
+                                      const std::function<void()>& take,
+                                      std::vector<BearingLoad>* v);
   /// Reactions by what bodies need, joints × 6.
   [[nodiscard]] MatX ReactionsBy(const ForceRows& at, const BodyStates& states,
                                  const VecX& wrenches) const;
@@ -206,7 +207,8 @@ class FreeDynamics {
   const SquareSystem scales_;
   SparseLeastNorm forces_;
   const std::vector<size_t> loaded_;  ///< elements with friction by load
-  VecX load_friction_;                ///< per element, at the last Accelerate()
+  /// Per element, at the last Accelerate(): S, and the force (1) of element_forces.h.
+  VecX load_friction_, load_force_;
 };
 
 }  // namespace mbv::internal

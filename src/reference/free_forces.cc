@@ -160,9 +160,7 @@ LoadSystem FreeDynamics::LoadsAt(double t_s, const ForceRows& at, const BodyStat
     along->col(static_cast<Eigen::Index>(d)) = push.f = R.transpose() * gradient;
     const VecX a = phase_.held.empty() ? VecX(rest_.H.ldlt().solve(push.f)) : HeldMotion(push);
     unit.push_back(ReactionsBy(at, states, Momenta(mechanism_, states, R * a) - gradient));
-    system.p.push_back(LoadOf(mechanism_, e, states, without));
-    system.sign.push_back(sign[e]);
-    system.per_load.push_back(PerLoad(mechanism_, e, states));
+    system.Add(mechanism_, e, states, sign[e], LoadOf(mechanism_, e, states, without));
   }
   for (const size_t e : loaded_) {
     std::vector<BearingLoad>& row = system.P.emplace_back();
@@ -177,33 +175,34 @@ RunSummary FreeDynamics::AddLoadFriction(double t_s, const BodyStates& states, c
   RunSummary summary = CheckLoadsUnique(loops, states);
   MatX along;
   LoadSystem system;
-  VecX n;
+  std::vector<BearingLoad> v;
   if (summary.ok()) {
     const bool held = !phase_.held.empty();
     system = LoadsAt(t_s, held ? ForceRowsAt(states, true) : loops, states, R, &along);
-    summary = system.Solve(&n);
+    summary = system.Solve(&v);
     if (!summary.ok()) summary.where = mechanism_.elements[loaded_[system.MostRaised()]].name;
   }
   const RestSystem without = rest_;
-  const auto take = [&] { TakeLoads(system, along, without, n); };
+  const auto take = [&] { TakeLoads(system, along, without, v); };
   if (summary.ok()) take();
   if (summary.ok() && !phase_.held.empty()) {
-    summary = FollowHeld(t_s, loops, states, R, A_p, take, &n);
+    summary = FollowHeld(t_s, loops, states, R, A_p, take, &v);
   }
   summary.time_s = t_s;
   return summary;
 }
 
-// Friction by loads n among the forces of what slides and the bounds of what rests.
+// Friction by loads v among the forces of what slides and the bounds of what rests.
 void FreeDynamics::TakeLoads(const LoadSystem& system, const MatX& along, const RestSystem& without,
-                             const VecX& n) {
+                             const std::vector<BearingLoad>& v) {
   load_friction_.setZero(static_cast<Eigen::Index>(mechanism_.elements.size()));
+  load_force_ = load_friction_;
   rest_.f = without.f;
   for (size_t d = 0; d < loaded_.size(); ++d) {
-    const auto k = static_cast<Eigen::Index>(d);
-    const double size = system.per_load[d] * n[k];
-    load_friction_[static_cast<Eigen::Index>(loaded_[d])] = size;
-    rest_.f -= system.sign[d] * size * along.col(k);
+    const auto e = static_cast<Eigen::Index>(loaded_[d]);
+    load_friction_[e] = system.Size(d, v[d]);
+    load_force_[e] = system.Force(d, v[d]);
+    rest_.f += load_force_[e] * along.col(static_cast<Eigen::Index>(d));
   }
   for (size_t k = 0; k < phase_.held.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
@@ -217,7 +216,8 @@ void FreeDynamics::TakeLoads(const LoadSystem& system, const MatX& along, const 
 // these and the loads agree.
 RunSummary FreeDynamics::FollowHeld(double t_s, const ForceRows& loops, const BodyStates& states,
                                     const MatX& R, const VecX& A_p,
-                                    const std::function<void()>& take, VecX* n) {
+                                    const std::function<void()>& take,
+                                    std::vector<BearingLoad>* v) {
   BodyStates moved = states;
   double last = std::numeric_limits<double>::infinity();
   for (int pass = 0; pass < kMostLoadPasses; ++pass) {
@@ -227,12 +227,13 @@ RunSummary FreeDynamics::FollowHeld(double t_s, const ForceRows& loops, const Bo
     VecX wrenches = NeededWrenches(t_s, moved) - LoadFrictionWrenches(moved);
     wrenches -= HeldRows(moved).gradients.transpose() * share;
     const MatX reactions = ReactionsBy(loops, moved, wrenches);
-    VecX next(n->size());
+    double change = 0.0, most = 0.0;
     for (size_t d = 0; d < loaded_.size(); ++d) {
-      next[static_cast<Eigen::Index>(d)] = SizeOf(LoadOf(mechanism_, loaded_[d], moved, reactions));
+      const BearingLoad next = LoadOf(mechanism_, loaded_[d], moved, reactions);
+      change = std::max(change, std::abs(SizeOf(next) - SizeOf((*v)[d])));
+      most = std::max(most, SizeOf(next));
+      (*v)[d] = next;
     }
-    const double change = (next - *n).cwiseAbs().maxCoeff(), most = next.maxCoeff();
-    *n = next;
     take();
     if (change <= 8.0 * kEps * most || (change >= last && change <= kStalledLoads * most)) {
       return RunSummary::Done();
@@ -260,11 +261,10 @@ VecX FreeDynamics::NeededWrenches(double t_s, const BodyStates& states) const {
 VecX FreeDynamics::LoadFrictionWrenches(const BodyStates& states) const {
   VecX wrenches = VecX::Zero(size_);
   if (loaded_.empty()) return wrenches;
-  const std::vector<int> sign = SignsAt(states);
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, states);
   for (const size_t e : loaded_) {
-    wrenches -= sign[e] * load_friction_[static_cast<Eigen::Index>(e)] *
-                GradientOf(rows[e], mechanism_.bodies.size());
+    wrenches +=
+        load_force_[static_cast<Eigen::Index>(e)] * GradientOf(rows[e], mechanism_.bodies.size());
   }
   return wrenches;
 }
@@ -286,6 +286,7 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
     BodyStates again = states;
     (void)Accelerate(t_s, &again);
     sample->load_friction = load_friction_;
+    sample->load_force = load_force_;
     if (held.size() > 0) held = LeastShares(rest_);
   }
   EvaluateMotion(motion_, t_s, &command_);

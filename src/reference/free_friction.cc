@@ -199,7 +199,6 @@ RunSummary FreeMotion::SwitchFriction(double to_s) {
   }
   off_ = std::move(off);
   dynamics_.SetPhase(std::move(next));
-  events_s_.push_back(now_.time_s);
   settled_here_ = 0;
   if (!event.stops.empty()) {
     if (RunSummary summary = Settle(event, 0.0); !summary.ok()) return summary;
@@ -474,7 +473,6 @@ RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
     return Contradiction(next.held.empty() ? friction_elements_.front() : next.held.front(),
                          "stops and starts again and again", settled_here_, "times");
   }
-  if (now_.time_s > 0.0) events_s_.push_back(now_.time_s);
   if (RunSummary summary = LeaveDeadCentres(&next); !summary.ok()) return summary;
   std::vector<size_t> stopping = next.held;
   std::erase_if(stopping, [held = dynamics_.phase().held](size_t e) {

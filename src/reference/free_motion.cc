@@ -179,8 +179,9 @@ RunSummary FreeMotion::Start(const BodyStates& states) {
   if (RunSummary summary = dynamics_.Project(0.0, &now_.states); !summary.ok()) return summary;
   RunSummary summary = dynamics_.Accelerate(0.0, &now_.states);
   now_.pivot = largest_pivot_ = dynamics_.pivot();
-  if (!summary.ok() || friction_elements_.empty()) return summary;
-  return BeginFriction();
+  if (summary.ok() && !friction_elements_.empty()) summary = BeginFriction();
+  NoteEvents();
+  return summary;
 }
 
 void FreeMotion::Rates(const State& x, State* rates, double t_s) {
@@ -342,6 +343,7 @@ RunSummary FreeMotion::Segment(double to_s) {
   time_.StartFrom(now_.time_s);
   if (!motion_.switches.empty()) {
     if (RunSummary summary = SwitchFriction(to_s); !summary.ok()) return summary;
+    NoteEvents();
   }
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
   while (to_s - now_.time_s > 1e-14 * std::max(duration_s_, to_s)) {
@@ -353,6 +355,7 @@ RunSummary FreeMotion::Segment(double to_s) {
       if (RunSummary summary = LookAhead(); !summary.ok()) return summary;
     }
     if (RunSummary summary = CheckFriction(); !summary.ok()) return summary;
+    NoteEvents();
     double t = now_.time_s;
     State x = Pack(now_);
     const double natural = dt_;
@@ -378,6 +381,7 @@ RunSummary FreeMotion::Segment(double to_s) {
       t = to_s;
     }
     if (RunSummary summary = AcceptWithFriction(x, t, corner); !summary.ok()) return summary;
+    NoteEvents();
     if (tried < kSmallestStepShare * duration_s_ && !to_the_end) return NoWayOn(tried);
   }
   return RunSummary::Done();
@@ -391,6 +395,27 @@ std::vector<int> FreeMotion::PiecesAt(const State& x) const {
     pieces.push_back(PieceOf(mechanism_.elements[e], row.value, RateOf(row, states.V_WB)));
   }
   return pieces;
+}
+
+// At a dead centre friction neither rests nor slides: it goes on as before.
+void FreeMotion::NoteEvents() {
+  const FrictionPhase& phase = dynamics_.phase();
+  const auto note = [&](size_t e, Happening now) {
+    log_.Note(mechanism_.elements[e], now_.time_s, now);
+  };
+  for (const size_t e : all_friction_) {
+    if (std::ranges::count(off_, e) > 0) note(e, Happening::kSwitchedOff);
+  }
+  for (const size_t e : phase.held) note(e, Happening::kRests);
+  for (const size_t e : friction_elements_) {
+    if (phase.sign[e] != 0) note(e, HappeningAt(phase.sign[e]));
+  }
+  if (corner_elements_.empty()) return;
+  const std::vector<int> pieces = PiecesAt(Pack(now_));
+  for (size_t k = 0; k < pieces.size(); ++k) {
+    const ForceElement& element = mechanism_.elements[corner_elements_[k]];
+    log_.Note(element, now_.time_s, HappeningOn(element, pieces[k]), pieces[k]);
+  }
 }
 
 // Where some law is on another piece after the step: the time just beyond the corner. A corner at
@@ -420,6 +445,7 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
     RunSummary summary = SwitchFriction(now_.time_s + motion_.sample_s);
     if (summary.ok()) summary = CheckFriction();
     if (!summary.ok()) return summary;
+    NoteEvents();
   }
   on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(duration_s_, t_s);
   if (on_bridge_) return SampleBridge(t_s);

@@ -24,6 +24,7 @@
 
 #include "base/run_summary.h"
 #include "kinematics/constraints.h"
+#include "mechanism/event_log.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/forward.h"
@@ -53,8 +54,7 @@ class FreeMotion {
   /// Work since the start, as WorkChannels().
   [[nodiscard]] const VecX& work() const { return on_bridge_ ? sampled_work_ : now_.work; }
   [[nodiscard]] FreeDynamics& dynamics() { return dynamics_; }
-  /// Times at which friction stopped or started something.
-  [[nodiscard]] const std::vector<double>& friction_events() const { return events_s_; }
+  [[nodiscard]] const std::vector<MotionEvent>& events() const { return log_.events(); }
   [[nodiscard]] long steps() const { return steps_; }
   [[nodiscard]] long evaluations() const { return evaluations_; }
   /// Crossings found so far, in time order.
@@ -89,6 +89,7 @@ class FreeMotion {
   /// Of the laws with corners (PieceOf()), in the order of corner_elements_.
   [[nodiscard]] std::vector<int> PiecesAt(const State& x) const;
   [[nodiscard]] double TimeToCorner(double h, const State& to);
+  void NoteEvents();
   [[nodiscard]] RunSummary SampleBridge(double t_s);
   /// Time to the singular pose ahead, if the weakest pivot goes on as between the last two nodes.
   [[nodiscard]] double TimeToSingular() const;
@@ -179,7 +180,7 @@ class FreeMotion {
   std::vector<size_t> off_;
   std::vector<size_t> corner_elements_;
   std::vector<char> fresh_;  ///< per element: slides since this very time
-  std::vector<double> events_s_;
+  EventLog log_;
   int settled_here_ = 0;  ///< how often friction was decided at this very time
 };
 

@@ -225,6 +225,14 @@ RunSummary ForceVariations::DifferentiateAll(ClosureSolver* closure, const MatX&
   std::vector<Vec6> required;
   RequiredWrenches(mechanism_, states, loads, friction_signs, &required);
   std::vector<Loaded> loaded = LoadsOf(states, friction_signs, load_friction);
+  for (const Loaded& at : loaded) {
+    const ForceElement& element = mechanism_.elements[at.element];
+    if (std::get<FrictionLaw>(element.law).skew == 0.0) continue;
+    return {.stop = Stop::kUnsupported,
+            .message = fmt::format("{} has efficiencies of its own either way: forces beside it "
+                                   "are not computed by derivatives",
+                                   Described(mechanism_, element))};
+  }
   VecX x = SolveForces(Stack(required));
   for (const Loaded& at : loaded) x += at.slope * at.load * at.unit;
   const MatX reactions = ReactionsOf(states, x);

@@ -49,8 +49,9 @@ struct ReferenceSample {
   DrivenSample joints;                        ///< Motion::RecordedJoints()
   /// Per force element, of those with dry friction: sign of the rate, 0 at rest (RestRate()).
   std::vector<int> friction_signs;
-  /// Per force element: friction by its joint's load, μ r N; empty where none depends on it.
-  VecX load_friction;
+  /// Per force element: friction by its joint's load, μ r N, and its force along the coordinate;
+  /// empty where none depends on it.
+  VecX load_friction, load_force;
   VecX drive_band, prescribed_band;  ///< half-widths of what friction at rest leaves open
   double closure_position_m = kNan, closure_rotation_rad = kNan;
   double control = kNan;  ///< smallest singular value of loops and commands (dimensionless)

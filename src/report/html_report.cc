@@ -287,6 +287,7 @@ class PageWriter {
     page_.Add("Motors", "Motors", SizingHtml(report_));
     page_.Add(PhaseSection(report_));
     page_.Add(ContactSection(report_));
+    page_.Add(EventSection(report_, false));
     page_.Add(SingularitySection(report_, false));
     page_.Add(EngineSection(report_));
     if (report_.source_model != nullptr) {

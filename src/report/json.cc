@@ -251,6 +251,7 @@ std::string ToJson(const Report& report) {
   if (!report.link_loads.empty()) json["dc_link"] = LinkJson(report);
   if (!report.phases.empty()) json["phases"] = PhasesJson(report);
   if (!report.contact_loads.empty()) json["contacts"] = ContactsJson(report);
+  if (auto events = EventsJson(report); !events.empty()) json["events"] = std::move(events);
   if (!report.singular.of.empty()) json["singularity"] = SingularityJson(report);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);

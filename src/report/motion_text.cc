@@ -33,6 +33,7 @@ class VerdictTableWriter {
     AddLines(SizingLines(report, out_.sizing() || out_.verbose()));
     out_.Add(PhaseSection(report));
     out_.Add(ContactSection(report));
+    out_.Add(EventSection(report, out_.verbose()));
     out_.Add(SingularitySection(report, out_.verbose()));
     out_.Add(DriveSection(report));
     out_.Add(EngineSection(report));

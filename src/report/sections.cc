@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <span>
 
 #include "base/text.h"
 #include "plot/svg_plot.h"
@@ -118,6 +120,91 @@ ReportSection PhaseSection(const Report& report) {
       "own forces, and traces and plots show those of the phase that begins.",
       On::kAll);
   return section;
+}
+
+namespace {
+
+constexpr size_t kMostEvents = 200;  // that a page lists
+
+std::vector<const Trace*> TracesWithEvents(const Report& report) {
+  std::vector<const Trace*> traces;
+  for (const WitnessRecord& witness : report.witnesses) {
+    if (!witness.trace.events.empty()) traces.push_back(&witness.trace);
+  }
+  return traces;
+}
+
+// Of each event its counterpart in another witness' trace, the one as late in the history of its
+// element; null where there the element does something else.
+std::vector<const MotionEvent*> Counterparts(const Trace& of, const Trace& in) {
+  std::map<std::string, std::vector<const MotionEvent*>> histories;
+  for (const MotionEvent& event : in.events) histories[event.element].push_back(&event);
+  std::map<std::string, size_t> next;
+  std::vector<const MotionEvent*> found;
+  for (const MotionEvent& event : of.events) {
+    const auto& history = histories[event.element];
+    const size_t k = next[event.element]++;
+    found.push_back(k < history.size() && history[k]->what == event.what ? history[k] : nullptr);
+  }
+  return found;
+}
+
+}  // namespace
+
+ReportSection EventSection(const Report& report, bool verbose) {
+  ReportSection section{.title = "Events", .link = "Events"};
+  const std::vector<const Trace*> traces = TracesWithEvents(report);
+  if (traces.empty()) return section;
+  const Trace& first = *traces.front();
+  const On on = verbose ? On::kAll : On::kPage;
+  Table table{.name = "events",
+              .caption = "Events between samples, " + first.witness,
+              .columns = {Digits("time"), Text("element"), Text("what")}};
+  const size_t listed = std::min(first.events.size(), kMostEvents);
+  for (const MotionEvent& event : std::span(first.events).first(listed)) {
+    table.rows.push_back(
+        {fmt::format("{:.9g} s", event.time_s), Code(event.element), ToText(event.what)});
+  }
+  std::vector<std::string> notes;
+  for (const Trace* other : std::span(traces).subspan(1)) {
+    const std::vector<const MotionEvent*> same = Counterparts(first, *other);
+    table.columns.push_back(Digits(other->witness + ", later by"));
+    double farthest = 0.0;
+    size_t count = 0;
+    for (size_t i = 0; i < same.size(); ++i) {
+      const double later = same[i] == nullptr ? kNan : same[i]->time_s - first.events[i].time_s;
+      if (i < listed) table.rows[i].emplace_back(same[i] ? fmt::format("{:.2g} s", later) : "–");
+      if (same[i] == nullptr) continue;
+      farthest = std::max(farthest, std::abs(later));
+      ++count;
+    }
+    const bool all = count == same.size() && count == other->events.size();
+    notes.push_back(
+        all ? fmt::format("{} and {} have the same {} events, times within {:.2g} s.",
+                          first.witness, other->witness, count, farthest)
+            : fmt::format("{} of {} events of {} are among the {} of {}, times within {:.2g} s.",
+                          count, same.size(), first.witness, other->events.size(), other->witness,
+                          farthest));
+  }
+  section.Add(std::move(table), on);
+  if (listed < first.events.size()) {
+    section.Note(fmt::format("{} more are in summary.json.", first.events.size() - listed), on);
+  }
+  for (std::string& note : notes) section.Note(std::move(note), on);
+  return section;
+}
+
+nlohmann::ordered_json EventsJson(const Report& report) {
+  auto json = nlohmann::ordered_json::array();
+  for (const Trace* trace : TracesWithEvents(report)) {
+    for (const MotionEvent& event : trace->events) {
+      json.push_back({{"witness", trace->witness},
+                      {"time_s", Number(event.time_s)},
+                      {"element", event.element},
+                      {"what", ToText(event.what)}});
+    }
+  }
+  return json;
 }
 
 ReportSection ContactSection(const Report& report) {

@@ -16,6 +16,13 @@ namespace mbv {
 /// `phases` of summary.json.
 [[nodiscard]] nlohmann::ordered_json PhasesJson(const Report& report);
 
+/// When force elements rest, slide, meet an end or are switched, by the first witness that found
+/// it, and how much later or earlier the others have it. On a terminal with `verbose` only; without
+/// blocks in commanded motions.
+[[nodiscard]] ReportSection EventSection(const Report& report, bool verbose);
+/// `events` of summary.json: of every witness.
+[[nodiscard]] nlohmann::ordered_json EventsJson(const Report& report);
+
 /// A row per foot, by the witness that a reader looks at first; the path of the centre of pressure
 /// under each foot. Without blocks where nothing stands on the ground.
 [[nodiscard]] ReportSection ContactSection(const Report& report);

@@ -487,7 +487,7 @@ void InScenarioTime(const Scenario& scenario, RunSummary* summary, Trace* trace)
   for (double& time_s : trace->time_s) {
     time_s = static_cast<double>(first + std::llround(time_s / sample_s)) * sample_s;
   }
-  for (double& time_s : trace->breaks_s) time_s += from_s;
+  for (MotionEvent& event : trace->events) event.time_s += from_s;
   summary->time_s += from_s;
   if (summary->states_time) {
     summary->message += fmt::format(" (its times begin at {:g} s)", from_s);

@@ -126,7 +126,9 @@ TEST(Derivatives, AccelerationsMayJumpWhereAWitnessSaysThatFrictionStopped) {
         left > 0.0 ? -2.0 : 0.0, 0.0, 0.7, 0.0, 0.0, 0.0;
   }
   EXPECT_GT(slides.Worst(), limit);
-  slides.trace.breaks_s = {stop};
+  slides.trace.events = {{.time_s = stop, .element = "dry", .what = Happening::kFree}};
+  EXPECT_GT(slides.Worst(), limit);
+  slides.trace.events[0].what = Happening::kRests;
   EXPECT_LT(slides.Worst(), limit);
   EXPECT_TRUE(slides.Measure().derivatives_gap.empty());
   synthetic::Stretch(&slides.trace, "d1.acceleration", 1.0 + 4.0 * limit);

@@ -47,7 +47,8 @@ inline void AddOneOfEach(Mechanism* m) {
                                  .carrier = RotorAxis{m->joints[j].parent, Vec3(0.6, 0.0, 0.8)}};
           break;
         case 4:
-          element.law = FrictionLaw{.coulomb = 0.7, .breakaway = 0.9, .stribeck_rate = 0.2};
+          element.law = FrictionLaw{
+              .coulomb = 0.7, .breakaway = 0.9, .stribeck_rate = 0.2, .resists = count > 7 ? 1 : 0};
           break;
         case 5:  // in touch at home
           element.law = StopLaw{.lower = m->joints[j].home[static_cast<size_t>(c)] + 0.3,

@@ -1,6 +1,9 @@
 // Blocks that slide on each other, for closed forms of stick and slip.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -63,6 +66,49 @@ struct StackedBlocks {
                                 .rate = d == 0 ? v : 0.0});
     }
     return motion;
+  }
+};
+
+/// A block on a freewheel that holds it against smaller positions, pushed by A sin ωt − B: it
+/// starts where that pushes forward, at t_0, comes to rest at t_1, and starts again a period later.
+struct RatchetedBlock {
+  static constexpr double mass = 2.0, A = 5.0, w = 3.0, capacity = 20.0;
+  double B = 2.0;
+
+  [[nodiscard]] Mechanism Make() const {
+    return StackedBlocks{{mass}, {{.coulomb = capacity, .breakaway = capacity, .resists = -1}}}
+        .Make();
+  }
+  [[nodiscard]] Motion Pushed(const Mechanism& m, double duration_s) const {
+    Motion motion = StackedBlocks::From(m, 0.0, 0.0, duration_s);
+    motion.forces[0].force = {{SineTerm{A, w / (2.0 * std::numbers::pi), 0.0}, ConstantTerm{-B}}};
+    return motion;
+  }
+  [[nodiscard]] double start() const { return std::asin(B / A) / w; }
+  [[nodiscard]] double period() const { return 2.0 * std::numbers::pi / w; }
+  [[nodiscard]] double Velocity(double since) const {
+    const double t0 = start(), t = t0 + since;
+    return (A / w * (std::cos(w * t0) - std::cos(w * t)) - B * since) / mass;
+  }
+  [[nodiscard]] double Way(double since) const {
+    const double t0 = start(), t = t0 + since;
+    return (A / w * (std::cos(w * t0) * since - (std::sin(w * t) - std::sin(w * t0)) / w) -
+            0.5 * B * since * since) /
+           mass;
+  }
+  /// After t_0.
+  [[nodiscard]] double moves() const {
+    double low = 0.5 * period(), high = period();
+    for (int i = 0; i < 100; ++i) {
+      const double middle = 0.5 * (low + high);
+      (Velocity(middle) > 0.0 ? low : high) = middle;
+    }
+    return low;
+  }
+  [[nodiscard]] double Position(double t) const {
+    if (t < start()) return 0.0;
+    const double turns = std::floor((t - start()) / period()), whole = Way(moves());
+    return turns * whole + Way(std::min(t - start() - turns * period(), moves()));
   }
 };
 

@@ -222,6 +222,36 @@ TEST(GearLosses, FollowACouplingOfTheirCoordinate) {
   finds("joint: turn, coupling: gear", "needs either efficiency or coefficient");
   finds("joint: turn, coupling: gear, efficiency: 1.2", "efficiency <= 1");
   finds("joint: turn, coupling: gear, efficiency: 0", "efficiency > 0");
+  finds("joint: turn, coupling: gear, efficiency: 0.8, efficiency_back: 1.1",
+        "efficiency_back <= 1");
+  finds("joint: turn, coupling: gear, efficiency: 0.8, coefficient_back: 0.1",
+        "coefficient_back goes with coefficient");
+  finds("joint: turn, coupling: gear, coefficient: 0.1, efficiency_back: 0.8",
+        "efficiency_back goes with efficiency");
+  finds("joint: turn, coupling: gear, coefficient: 0.1, coefficient_back: -1",
+        "coefficient_back >= 0");
+  finds("joint: turn, coupling: gear, coefficient: 0.1, resists: positive",
+        "no meaning with friction by load");
+}
+
+TEST(GearLosses, MayDifferEitherWay) {
+  const LoadResult loaded = LoadModelText(
+      WithElements("  g: {kind: friction, joint: turn, coupling: gear, efficiency: 0.8,"
+                   " efficiency_back: 0.625}\n  f: {kind: friction, joint: turn, coulomb: 3,"
+                   " resists: negative}\n") +
+          "couplings: {gear: {joint: slide, coordinate: 1, follows: turn, ratio: -1/5}}\n",
+      "m.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const auto& gear = LawOf<FrictionLaw>(*loaded.mechanism, 0);
+  EXPECT_DOUBLE_EQ(gear.coefficient + gear.skew, 0.25);
+  EXPECT_DOUBLE_EQ(gear.coefficient - gear.skew, 0.375);
+  EXPECT_EQ(gear.resists, 0);
+  EXPECT_EQ(LawOf<FrictionLaw>(*loaded.mechanism, 1).resists, -1);
+  const LoadResult again = LoadModelText(WriteModel(*loaded.mechanism), "m.yaml");
+  ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
+  ExpectSameElements(*loaded.mechanism, *again.mechanism);
+  EXPECT_EQ(LawOf<FrictionLaw>(*again.mechanism, 0).skew, gear.skew);
+  EXPECT_EQ(LawOf<FrictionLaw>(*again.mechanism, 1).resists, -1);
 }
 
 TEST(StopsAndCurves, AreReadWrittenAndReadAgain) {

@@ -30,6 +30,51 @@ TEST(ReferenceCoupling, TorqueIsThatOfTheEquationOfMotion) {
   EXPECT_GT(TorqueError(run.trace, perturbed), 1e-11);
 }
 
+TEST(ReferenceCoupling, LossesAreThoseOfEitherDirectionOfPower) {
+  const CoupledWheels wheels{.loss = 0.25, .loss_back = 0.4};
+  const Mechanism m = wheels.Make();
+  const ReferenceRun run = RunReference(m, Turning(m));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_LT(TorqueError(run.trace, wheels), 1e-12);
+  const VecX power = ColumnOf(run.trace, "power.input"),
+             rate = ColumnOf(run.trace, "power.energy_rate");
+  EXPECT_LT((power - rate).cwiseAbs().maxCoeff(), 1e-12 * power.cwiseAbs().maxCoeff());
+  for (double CoupledWheels::*number : {&CoupledWheels::loss, &CoupledWheels::loss_back}) {
+    CoupledWheels perturbed = wheels;
+    perturbed.*number *= 1.0 + 1e-6;
+    EXPECT_GT(TorqueError(run.trace, perturbed), 1e-8);
+  }
+}
+
+// The second wheel's weight turns both, or not: the first is driven back and locks where nothing of
+// the power comes out there.
+TEST(ReferenceCoupling, WhatIsDrivenBackMovesOrLocks) {
+  for (const double back : {0.4, 1.0}) {
+    const CoupledWheels wheels{.curve = 0.0, .loss = 0.25, .loss_back = back};
+    const Mechanism m = wheels.Make();
+    const ForwardRun run = RunForwardReference(m, FreeMotion(m, 0.0, 0.0, 1.0));
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    CoupledWheels perturbed = wheels;
+    perturbed.loss_back *= 1.0 + 1e-6;
+    double error = 0.0, seen = 0.0, farthest = 0.0;
+    for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+      const double q = At(run.trace, i, "motor.position"), v = At(run.trace, i, "motor.velocity"),
+                   a = At(run.trace, i, "motor.acceleration");
+      farthest = std::max(farthest, std::abs(q));
+      if (v == 0.0) continue;
+      error = std::max(error, std::abs(wheels.Torque(q, v, a)));
+      seen = std::max(seen, std::abs(perturbed.Torque(q, v, a)));
+    }
+    if (back == 1.0) {
+      EXPECT_EQ(farthest, 0.0);
+      continue;
+    }
+    EXPECT_GT(farthest, 1.0);
+    EXPECT_LT(error, 1e-11);
+    EXPECT_GT(seen, 1e-8);
+  }
+}
+
 TEST(ReferenceCoupling, CountsInMobility) {
   Mechanism m = CoupledWheels().Make();
   const Mobility coupled = AnalyseMobility(m);

@@ -152,8 +152,9 @@ TEST(ReferenceElements, FrictionByLoadBreaksAwayByTheLoad) {
   motion.forces[0].force = {{RampTerm{.rate = r}}};
   const ForwardRun run = RunForwardReference(m, motion);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-  ASSERT_EQ(run.trace.breaks_s.size(), 1U);
-  EXPECT_NEAR(run.trace.breaks_s[0], start, 1e-11);
+  ASSERT_EQ(run.trace.events.size(), 1U);
+  EXPECT_NEAR(run.trace.events[0].time_s, start, 1e-11);
+  EXPECT_EQ(run.trace.events[0].what, Happening::kSlidesUp);
   for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
     const double t = run.trace.time_s[static_cast<size_t>(i)];
     const double L = At(run.trace, i, "leg.position"), rate = At(run.trace, i, "leg.velocity");
@@ -165,7 +166,7 @@ TEST(ReferenceElements, FrictionByLoadBreaksAwayByTheLoad) {
   }
   const ForwardRun perturbed =
       RunForwardReference(PushedBlock{.coefficient = 0.2501}.Make(), motion);
-  EXPECT_GT(std::abs(perturbed.trace.breaks_s.at(0) - start), 1e-5);
+  EXPECT_GT(std::abs(perturbed.trace.events.at(0).time_s - start), 1e-5);
 }
 
 // A journal as large as that takes back more load than it makes: no acceleration, or several.

@@ -107,6 +107,49 @@ TEST(StickSlip, AGrowingForceBreaksABlockAwayAtItsBreakaway) {
 }
 
 // With Fs = Fc the block goes on without a jump, with Stribeck's curve it runs away.
+TEST(StickSlip, AFreewheelHoldsOneWay) {
+  const RatchetedBlock block;
+  const Mechanism m = block.Make();
+  const ForwardRun run = RunForwardReference(m, block.Pushed(m, 5.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const auto x = [](const RatchetedBlock& of) { return [of](double t) { return of.Position(t); }; };
+  EXPECT_LT(LargestError(run.trace, "motor1.position", x(block)), kFollowed);
+  EXPECT_GT(LargestError(run.trace, "motor1.position", x({.B = block.B * (1.0 + 1e-6)})), 1e-7);
+  EXPECT_EQ(ColumnOf(run.trace, "dampers.work").cwiseAbs().maxCoeff(), 0.0);
+  ASSERT_EQ(run.trace.events.size(), 5U);
+  for (size_t i = 0; i < 5; ++i) {
+    const MotionEvent& event = run.trace.events[i];
+    EXPECT_EQ(event.element, "dry1");
+    EXPECT_EQ(event.what, i % 2 == 0 ? Happening::kSlidesUp : Happening::kRests);
+    EXPECT_NEAR(event.time_s,
+                block.start() + block.period() * static_cast<double>(i / 2) +
+                    (i % 2 == 0 ? 0.0 : block.moves()),
+                kFollowed);
+  }
+}
+
+// Turned about, it holds against larger positions, and in commanded motion no drive feels it but at
+// rest: between nothing and its capacity.
+TEST(StickSlip, ACommandedFreewheelIsFeltOneWay) {
+  for (const int resists : {1, -1}) {
+    Mechanism m = RatchetedBlock().Make();
+    std::get<FrictionLaw>(m.elements[0].law).resists = resists;
+    const Profile profile{{SineTerm{1.0, 0.5, 0}}};
+    const ReferenceRun run = RunReference(m, DriveMotion(m, {profile}, 1.0, 0.05));
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    const VecX v = ColumnOf(run.trace, "motor1.velocity"),
+               a = ColumnOf(run.trace, "motor1.acceleration"),
+               force = ColumnOf(run.trace, "motor1.force") - RatchetedBlock::mass * a,
+               band = ColumnOf(run.trace, "motor1.force.band");
+    for (Eigen::Index i = 0; i < v.size(); ++i) {
+      const bool rests = i == 10, holds = v[i] * resists > 0.0;
+      const double capacity = resists * RatchetedBlock::capacity;
+      EXPECT_NEAR(force[i], rests ? 0.5 * capacity : holds ? capacity : 0.0, 1e-10) << i;
+      EXPECT_NEAR(band[i], rests ? 0.5 * RatchetedBlock::capacity : 0.0, 1e-12) << i;
+    }
+  }
+}
+
 TEST(StickSlip, StribeckFrictionFallsFromBreakawayAndBalancesEnergy) {
   for (const double stribeck : {0.05, 0.3}) {
     const FrictionLaw law{.coulomb = 1.0, .breakaway = 2.0, .stribeck_rate = stribeck};

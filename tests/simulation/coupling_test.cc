@@ -42,6 +42,21 @@ TEST(SimulatedCoupling, TorqueIsThatOfTheEquationOfMotion) {
   }
 }
 
+TEST(SimulatedCoupling, LossesAreThoseOfEitherDirectionOfPower) {
+  const CoupledWheels wheels{.loss = 0.25, .loss_back = 0.4};
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
+    const bool forward = mode == DriveMode::kPrescribedMotion;
+    const SimulationRun run = Simulate(wheels.Make(), FourSeconds(), Turning, {.mode = mode});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    EXPECT_LT(fixtures::TorqueError(run, Turning, wheels), forward ? 1e-8 : 1e-12);
+    for (double CoupledWheels::*number : {&CoupledWheels::loss, &CoupledWheels::loss_back}) {
+      CoupledWheels perturbed = wheels;
+      perturbed.*number *= 1.0 + 1e-5;
+      EXPECT_GT(fixtures::TorqueError(run, Turning, perturbed), 1e-7);
+    }
+  }
+}
+
 // Three linear terms are a fixed tendon: the third wheel is the sum of the others.
 TEST(SimulatedCoupling, ASumIsAFixedTendon) {
   Mechanism m = CoupledWheels().Make();

@@ -102,6 +102,30 @@ TEST(SimulatedStickSlip, AGrowingForceBreaksABlockAwayAtItsBreakaway) {
   EXPECT_LT(Farthest(run.trace, "motor1.velocity", v), 1e-9);
 }
 
+TEST(SimulatedStickSlip, AFreewheelHoldsOneWay) {
+  const fixtures::RatchetedBlock block;
+  const Mechanism m = block.Make();
+  const SimulationRun run = SlipFreely(m, block.Pushed(m, 5.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const auto x = [](const fixtures::RatchetedBlock& of) {
+    return [of](double t) { return of.Position(t); };
+  };
+  EXPECT_LT(Farthest(run.trace, "motor1.position", x(block)), 1e-9);
+  EXPECT_GT(Farthest(run.trace, "motor1.position", x({.B = block.B * (1.0 + 1e-6)})), 1e-7);
+  ASSERT_EQ(run.trace.events.size(), 5U);
+  for (size_t i = 0; i < 5; ++i) {
+    const MotionEvent& event = run.trace.events[i];
+    EXPECT_EQ(event.what, i % 2 == 0 ? Happening::kSlidesUp : Happening::kRests);
+    EXPECT_NEAR(event.time_s,
+                block.start() + block.period() * static_cast<double>(i / 2) +
+                    (i % 2 == 0 ? 0.0 : block.moves()),
+                1e-8);
+  }
+  const SimulationRun stock = SlipFreely(m, block.Pushed(m, 1.0), 1e-3, Engine::kStock);
+  EXPECT_EQ(stock.summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(stock.summary.where, "dry1");
+}
+
 // MuJoCo decides who holds whom.
 TEST(SimulatedStickSlip, TwoBlocksRestMoveTogetherOrSlip) {
   const double lower = 2.0, upper = 1.0, ground = 3.0, between = 1.5;

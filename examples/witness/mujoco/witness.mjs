@@ -14,7 +14,7 @@ const METHODS = {
 const DECLINED = [{what: 'joint reactions', why: 'only drives, outputs and loops are read out'}];
 
 // Friction that the joint's load does not raise, of a hinge or slide.
-const isDry = ({law, on}) => law.coulomb !== undefined && law.coefficient === 0 && on.joint !== undefined && on.coordinate === 0;
+const isDry = ({law, on}) => law.coulomb !== undefined && law.coefficient === 0 && law.resists === undefined && on.joint !== undefined && on.coordinate === 0;
 
 // What MuJoCo has no word for, or what the generated model leaves to whoever steps it.
 function refuse(mechanism, loads, simulation) {

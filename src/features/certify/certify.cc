@@ -699,16 +699,24 @@ class Prover {
     return loaded_.empty() ? "" : AddLoadFriction(system, motions);
   }
 
-  // Friction F_d = −s_d c_d n_d by the loads n_e of bearings, (1) of FrictionLaw, c: PerLoad().
-  // Forces depend on it linearly, so that with p_e the load without it and P_ed of a unit force,
-  //   n_e = |p_e + Σ_d F_d P_ed| =: g_e(n), |p|: the sum of the lengths of its parts
-  // which contracts by q = max_e Σ_d |P_ed| c_d: |n − ñ| ≤ |g(ñ) − ñ| / (1 − q) where q < 1.
+  using Bearings = std::array<exact::Vector<T>, 3>;
+  // Friction F_d = −s_d c_d |n_d| + ε_d n_d by the loads n_e of bearings, (1) of FrictionLaw, c:
+  // PerLoad(), or by the forces n_e of couplings. Forces depend on it linearly, so that with p_e
+  // the load without it and P_ed of a unit force,
+  //   n_e = |p_e + Σ_d F_d P_ed| =: g_e(n), |p|: the sum of the lengths of its parts, or p itself
+  // which contracts by q = max_e Σ_d |P_ed| (c_d + |ε_d|): |n − ñ| ≤ |g(ñ) − ñ| / (1 − q) where
+  // q < 1.
   struct Loaded {
     size_t element = 0;
-    T slope;  ///< F_d / n_d
+    T slope, skew;  ///< F_d = slope |n_d| + skew n_d
+    bool is_signed = false;
     std::vector<Wrench<T>> wrenches;
+
+    [[nodiscard]] T Force(const T& n) const {
+      return is_signed ? T(slope * abs(n) + skew * n) : T(slope * n);
+    }
+    [[nodiscard]] T Load(const Bearings& of) const { return is_signed ? of[2][0] : Norm(of); }
   };
-  using Bearings = std::array<exact::Vector<T>, 3>;
   static double LargestRadius(const FrictionLaw& law) {
     return law.coupling >= 0 ? 1.0 : std::max(law.radius, law.thrust_radius);
   }
@@ -739,7 +747,9 @@ class Prover {
     double contraction = 0.0;
     for (size_t e = 0; e < n; ++e) {
       T sum(0);
-      for (size_t d = 0; d < n; ++d) sum += Norm(P[e][d]) * abs(loaded_[d].slope);
+      for (size_t d = 0; d < n; ++d) {
+        sum += Norm(P[e][d]) * (abs(loaded_[d].slope) + abs(loaded_[d].skew));
+      }
       contraction = std::max(contraction, Size(sum));
     }
     if (!(contraction < 1.0)) return "not provable: friction and loads raise each other";
@@ -749,10 +759,10 @@ class Prover {
         Bearings sum = p[e];
         for (size_t d = 0; d < n; ++d) {
           for (size_t k = 0; k < sum.size(); ++k) {
-            sum[k] = sum[k] + exact::Times(T(loaded_[d].slope * of[d]), P[e][d][k]);
+            sum[k] = sum[k] + exact::Times(loaded_[d].Force(of[d]), P[e][d][k]);
           }
         }
-        next[e] = Norm(sum);
+        next[e] = loaded_[e].Load(sum);
       }
       return next;
     };
@@ -772,7 +782,7 @@ class Prover {
     step = 0.0;
     for (size_t e = 0; e < n; ++e) step = std::max(step, Size(T(next[e] - load[e])));
     for (size_t d = 0; d < n; ++d) {
-      const T force = loaded_[d].slope * Around(load[d], step / (1.0 - contraction) * Slack(4));
+      const T force = loaded_[d].Force(Around(load[d], step / (1.0 - contraction) * Slack(4)));
       for (size_t k = 0; k < force_.size(); ++k) force_[k] += force * response[d][k];
       Exert(force, loaded_[d].wrenches);
     }
@@ -1098,16 +1108,15 @@ class Prover {
       } else if (!(low >= -rest && high <= rest)) {
         return fmt::format("not provable: whether '{}' slides or rests is open", element.name);
       }
-      if (sign != 0) {
-        T size(friction->coulomb);
-        if (friction->stribeck_rate > 0.0) {
-          const T slowness = x.r / T(friction->stribeck_rate);
-          size += (T(friction->breakaway) - T(friction->coulomb)) * exp(T(-slowness * slowness));
-        }
-        force = T(-sign) * share * size;
-        if (friction->by_load()) {
-          loaded_.push_back({e, T(-sign) * share * PerLoad(*friction), wrenches});
-        }
+      T size(sign == 0 ? friction->breakaway : friction->coulomb);
+      if (sign != 0 && friction->stribeck_rate > 0.0) {
+        const T slowness = x.r / T(friction->stribeck_rate);
+        size += (T(friction->breakaway) - T(friction->coulomb)) * exp(T(-slowness * slowness));
+      }
+      force = T(-friction->sense(sign)) * share * size;
+      if (friction->by_load() && (sign != 0 || friction->skew != 0.0)) {
+        loaded_.push_back({e, T(-sign) * share * PerLoad(*friction), share * T(friction->skew),
+                           friction->coupling >= 0, wrenches});
       }
     }
     Exert(force, wrenches);

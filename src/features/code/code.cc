@@ -204,7 +204,7 @@ class CodeMaker {
 
   bool MakeTable() {
     std::string why;
-    options_.table = MakeStartTable(*formulas_, spread_.low, spread_.high, &why,
+    options_.table = MakeStartTable(*formulas_, spread_.low, spread_.high, settings_.cells, &why,
                                     [this](double share) { Report(0.4 + 0.4 * share); });
     if (!why.empty()) {
       result_.diagnostics.AddError(m_.file, "no table that is proved: " + why,

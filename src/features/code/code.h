@@ -25,7 +25,8 @@ struct CodeRange {
 struct CodeSettings {
   std::string name = {};               ///< before all names in C; "": of the mechanism
   std::vector<CodeRange> ranges = {};  ///< of all coordinates: with a table to start from
-  size_t states = 10000;               ///< that it is judged by
+  int cells = 0;  ///< of the table per coordinate, a power of 2; 0: 512, 64 or 16 by their number
+  size_t states = 10000;  ///< that it is judged by
   std::uint64_t seed = 1;
   std::string check = {};  ///< another header with the same functions, to be judged instead
   bool compile = true;
@@ -110,10 +111,11 @@ struct CodeTask {
 // |J⁻¹ ∂r/∂y_before|. Cells are connected with the one at home by common solutions on their faces,
 // so that the branch is that of home.
 
-/// Over the box; cells that are not proved are outside. At most three coordinates. An empty table
+/// Over the box; cells (CodeSettings::cells) that are not proved are outside. At most three
+/// coordinates. An empty table
 /// (no cells) with `why` where a proof is beyond it: balls that are searched, large blocks.
 [[nodiscard]] StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low,
-                                        const VecX& high, std::string* why,
+                                        const VecX& high, int cells, std::string* why,
                                         const std::function<void(double)>& progress);
 
 /// Over the cells that `start` proves.

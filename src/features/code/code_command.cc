@@ -90,6 +90,10 @@ void AddCodeCommand(CLI::App* app, int* exit_code) {
                    "NAME_deg=LOW:HIGH (NAME= in rad or m, NAME_mm=) of each coordinate: adds a "
                    "table to start from, and the proof of where that does")
       ->allow_extra_args(false);
+  code->add_option("--cells", arguments->settings.cells,
+                   "of the table, per coordinate: more prove more of the ranges, in more time "
+                   "(512, 64 or 16 of one, two or three coordinates)")
+      ->check(CLI::IsMember({4, 8, 16, 32, 64, 128, 256, 512}));
   code->add_option("--name", arguments->settings.name, "of the files, and before names in C");
   code->add_option("--check", arguments->settings.check,
                    "a header with the same functions, to be judged instead of the one made");

@@ -992,6 +992,7 @@ class FormulaMaker {
         Take(v, force, along);
       } else if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
         if (friction->by_load()) Unsupported(Described(m_, element) + " grows with its load");
+        if (friction->resists != 0) Unsupported(Described(m_, element) + " resists one way only");
         const Expr direction = made_->graph.Make(FormulaOp::kDirection, v,
                                                  Expr(RestRate(m_, element, Motion().duration_s)));
         Expr size(friction->coulomb);

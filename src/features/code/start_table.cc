@@ -1006,7 +1006,8 @@ class TableMaker {
 }  // namespace
 
 StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low, const VecX& high,
-                          std::string* why, const std::function<void(double)>& progress) {
+                          int cells, std::string* why,
+                          const std::function<void(double)>& progress) {
   const size_t n = formulas.size();
   StartTable best{.low = low, .high = high};
   if (n > 3) *why = fmt::format("one over {} coordinates would be large", n);
@@ -1028,8 +1029,9 @@ StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low, co
   constexpr int kLeastNodes = 5, kLeastSteps = 3, kMostSteps = 5;
   constexpr double kWorth = 1.02;
   TableMaker maker(formulas, low, high, progress);
+  if (cells == 0) cells = kCells[n - 1];
   const auto better = [&](int nodes, int steps) {
-    StartTable table = maker.Make(nodes, kCells[n - 1], steps);
+    StartTable table = maker.Make(nodes, cells, steps);
     const auto count = [](const StartTable& of) {
       return static_cast<double>(std::ranges::count(of.proved, true));
     };

@@ -442,6 +442,7 @@ bool SameLaw(const RotorLaw& a, const RotorLaw& b) {
 bool SameLaw(const FrictionLaw& a, const FrictionLaw& b) {
   return Same(a.coulomb, b.coulomb) && Same(a.breakaway, b.breakaway) &&
          Same(a.stribeck_rate, b.stribeck_rate) && Same(a.coefficient, b.coefficient) &&
+         Same(a.skew, b.skew) && a.resists == b.resists &&
          Same(a.coefficient * a.radius, b.coefficient * b.radius) &&
          Same(a.thrust_radius, b.thrust_radius) && a.coupling == b.coupling &&
          (a.length == b.length || Same(a.length, b.length));

@@ -33,8 +33,8 @@ void Append(const Trace& more, Trace* all) {
     if (before.Find(channel.name) < 0) channels.push_back(channel);
   }
   all->witness = before.witness;
-  all->breaks_s = before.breaks_s;
-  all->breaks_s.insert(all->breaks_s.end(), more.breaks_s.begin(), more.breaks_s.end());
+  all->events = before.events;
+  all->events.insert(all->events.end(), more.events.begin(), more.events.end());
   all->Reset(std::move(times), std::move(channels));
   for (size_t c = 0; c < all->channels.size(); ++c) {
     const auto column = static_cast<Eigen::Index>(c);

@@ -449,7 +449,7 @@ class TransmissionFinder {
     for (ForceElement& element : full.elements) {
       auto* friction = std::get_if<FrictionLaw>(&element.law);
       if (friction == nullptr || friction->coefficient == 0.0) continue;
-      friction->coefficient = 0.0;
+      friction->coefficient = friction->skew = 0.0;
       by_load = true;
     }
     if (by_load) {

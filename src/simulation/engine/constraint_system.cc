@@ -325,7 +325,7 @@ double ConstraintSystem::FrictionUnit(int row) const {
 
 double ConstraintSystem::Breakaway(size_t element) const {
   const auto& law = std::get<FrictionLaw>(engine_.mechanism->elements[element].law);
-  return engaged(element) * law.breakaway + load_friction(element);
+  return engaged(element) * law.half_band() + load_friction(element);
 }
 
 double ConstraintSystem::HeldLoss(int row) const {

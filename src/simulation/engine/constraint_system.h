@@ -126,14 +126,24 @@ class ConstraintSystem {
   [[nodiscard]] int coupling_row(int coupling) const { return first_coupling_ + coupling; }
 
   /// Friction by the joints' loads that force() balances, per force element; empty: none.
-  void SetLoadFriction(const VecX& size) { load_friction_ = size; }
+  struct FrictionByLoad {
+    VecX size = {};   ///< S of FrictionLaw
+    VecX force = {};  ///< ε Q along the coordinate, at any rate
+  };
+  void SetLoadFriction(FrictionByLoad friction) { load_friction_ = std::move(friction); }
+  [[nodiscard]] const FrictionByLoad& load_friction() const { return load_friction_; }
   /// Share of its force with which a force element acts (Switch), at a time.
   void SetEngaged(const Motion& motion, double t_s) { EvaluateSwitches(motion, t_s, &engaged_); }
   [[nodiscard]] double engaged(size_t element) const {
     return element < engaged_.size() ? engaged_[element] : 1.0;
   }
   [[nodiscard]] double load_friction(size_t element) const {
-    return load_friction_.size() == 0 ? 0.0 : load_friction_[static_cast<Eigen::Index>(element)];
+    const VecX& size = load_friction_.size;
+    return size.size() == 0 ? 0.0 : size[static_cast<Eigen::Index>(element)];
+  }
+  [[nodiscard]] double load_force(size_t element) const {
+    const VecX& force = load_friction_.force;
+    return force.size() == 0 ? 0.0 : force[static_cast<Eigen::Index>(element)];
   }
 
   /// Rows of MuJoCo's frictionloss, behind the equalities (free motion with dry friction).
@@ -186,7 +196,8 @@ class ConstraintSystem {
   int rows_ = 0, first_coupling_ = 0, closure_rows_ = 0;
   std::vector<int> closure_row_, driven_row_;
   std::vector<bool> coupling_is_length_;
-  VecX given_, load_friction_;
+  VecX given_;
+  FrictionByLoad load_friction_;
   std::vector<int> sliding_;
   std::vector<double> engaged_;
   MatX unit_;  // column k: gradient of driven joint k, where it has no row

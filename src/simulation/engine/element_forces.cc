@@ -111,6 +111,7 @@ std::string FrictionTrouble(const ForceElement& element, DriveMode drives, bool 
   }
   if (own_events) return "";
   if (law.by_load()) return "MuJoCo's frictionloss knows no load of the joint";
+  if (law.resists != 0) return "MuJoCo's frictionloss resists both signs of the rate";
   if (law.breakaway == law.coulomb) return "";
   return "MuJoCo's frictionloss knows no breakaway force other than coulomb";
 }
@@ -247,6 +248,7 @@ ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
   at.engaged = system.engaged(element);
   at.rests = std::abs(at.rate) <= place.rest_rate;
   at.load_friction = system.load_friction(element);
+  at.load_force = system.load_force(element);
   AddHolding(system, element, &at);
   if (place.carrier >= 0) AddCarrier(system, element, &at);
   return at;
@@ -275,13 +277,15 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     return -spring->preload - PowerSum(spring->polynomial, at.position - spring->free);
   }
   if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
-    if (at.rests) return at.held;
+    if (at.rests) {
+      return at.held + at.load_force - at.engaged * friction->sense(0) * friction->breakaway;
+    }
     const double ratio = at.rate / friction->stribeck_rate;
     const double curve = friction->stribeck_rate > 0.0 ? std::exp(-(ratio * ratio)) : 0.0;
     const double most =
         at.engaged * (friction->breakaway * curve + friction->coulomb * (1.0 - curve));
-    if (at.sliding != 0) return -at.sliding * (most + at.load_friction);
-    return -std::copysign(most + at.load_friction, at.rate);
+    const int sign = at.sliding != 0 ? at.sliding : at.rate > 0.0 ? 1 : -1;
+    return at.load_force - friction->sense(sign) * most - sign * at.load_friction;
   }
   if (const auto* stop = std::get_if<StopLaw>(&element.law)) return -OfStop(*stop, at).whole;
   if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
@@ -322,7 +326,7 @@ bool Dissipates(const ForceElement& element) {
 
 double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
   if (!at.rests || !HasFriction(element)) return 0.0;
-  return at.engaged * std::get<FrictionLaw>(element.law).breakaway + at.load_friction;
+  return at.engaged * std::get<FrictionLaw>(element.law).half_band() + at.load_friction;
 }
 
 ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
@@ -431,7 +435,7 @@ void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceler
     if (mjcf::IsPlanned(elements[e])) continue;
     const ElementPlace& place = engine.elements[e];
     ElementMotion at = ElementMotionOf(system, e);
-    if (at.rests && HasFriction(elements[e])) continue;  // unknown, or MuJoCo's own
+    if (at.rests && HasFriction(elements[e])) at.held = 0.0;  // unknown, or MuJoCo's own
     if (elements[e].drive >= 0 && elements[e].drive < driven_acceleration.size()) {
       at.acceleration = driven_acceleration[elements[e].drive];
     }

@@ -56,6 +56,7 @@ struct ElementMotion {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
   bool rests = false;  ///< where it may have dry friction: at most at the rest rate, or held
   double load_friction = 0.0;  ///< by the joint's load (load_friction.h)
+  double load_force = 0.0;     ///< ε Q of a coupling's losses
   int sliding = 0;             ///< where it is known: sign of the rate
   double engaged = 1.0;        ///< share of its force that acts (Switch)
   double held = 0.0;           ///< force of MuJoCo's row that holds it
@@ -73,7 +74,8 @@ struct ElementMotion {
 /// with, or 0, the middle of what statics allows.
 [[nodiscard]] double ForceOf(const ForceElement& element, const ElementMotion& at);
 
-/// Friction may be anywhere within ± this: the breakaway force at rest, otherwise 0.
+/// Friction may be anywhere within ± this about ForceOf(): the breakaway force at rest, of a
+/// freewheel half of it, otherwise 0.
 [[nodiscard]] double BreakawayAt(const ForceElement& element, const ElementMotion& at);
 
 /// Of a rotor on the body that carries it, world axes [N m]:

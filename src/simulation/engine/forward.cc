@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "mechanism/event_log.h"
 #include "simulation/engine/element_forces.h"
 #include "simulation/engine/integrator.h"
 #include "simulation/engine/session.h"
@@ -82,6 +83,8 @@ class StickSlip {
   [[nodiscard]] double RateAfter(const Integrator::Node& node, size_t element, double from_s,
                                  double h);
   [[nodiscard]] double Moving(size_t element) const;
+  /// Into the trace.
+  void NoteEvents(double t_s);
 
   Session& s_;
   Integrator& integrator_;
@@ -93,6 +96,7 @@ class StickSlip {
   std::vector<size_t> corners_;  ///< elements whose law has corners
   std::vector<int> pieces_;      ///< of these, at the present node
   std::vector<double> rates_;    ///< of these, by (1)
+  EventLog log_;
   RunSummary trouble_ = RunSummary::Done();
   int uniform_ = 4;  ///< nodes since the last event, as in Step
 };
@@ -149,7 +153,21 @@ RunSummary StickSlip::SwitchOver(const Step& step) {
 
 RunSummary StickSlip::Begin() {
   pieces_ = Pieces();
-  return LetGo(0.0);
+  RunSummary summary = LetGo(0.0);
+  NoteEvents(0.0);
+  return summary;
+}
+
+void StickSlip::NoteEvents(double t_s) {
+  const std::vector<ForceElement>& elements = s_.engine.mechanism->elements;
+  for (const size_t e : friction_elements_) {
+    log_.Note(elements[e], t_s, IsOff(e) ? Happening::kSwitchedOff : HappeningAt(sliding_[e]));
+  }
+  for (size_t k = 0; k < corners_.size(); ++k) {
+    const ForceElement& element = elements[corners_[k]];
+    log_.Note(element, t_s, HappeningOn(element, pieces_[k]), pieces_[k]);
+  }
+  s_.run->trace.events = log_.events();
 }
 
 std::vector<int> StickSlip::Pieces() const {
@@ -227,9 +245,9 @@ RunSummary StickSlip::AfterJump(const Step& next) {
   for (const size_t e : friction_elements_) {
     if (IsOff(e) != std::ranges::binary_search(before, e)) FindDirection(e);
   }
-  s_.run->trace.breaks_s.push_back(next.from_s);
   if (RunSummary summary = Jump(next.from_s); !summary.ok()) return summary;
   if (RunSummary summary = LetGo(next.from_s); !summary.ok()) return summary;
+  NoteEvents(next.from_s);
   s_.work.Jump(s_.WorkRates());
   uniform_ = 0;
   return RunSummary::Done();
@@ -417,13 +435,14 @@ RunSummary StickSlip::Advance(const Step& step) {
     }
     pieces_ = Pieces();
     if (event.stops.empty() && event.starts.empty()) {  // forces go on at a corner
+      NoteEvents(from);
       uniform_ = 0;
       continue;
     }
-    s_.run->trace.breaks_s.push_back(from);
     if (RunSummary summary = Apply(event, from); !summary.ok()) return summary;
     if (RunSummary summary = Jump(from); !summary.ok()) return summary;
     if (RunSummary summary = LetGo(from); !summary.ok()) return summary;
+    NoteEvents(from);
     s_.work.Jump(s_.WorkRates());
     uniform_ = 0;
   }

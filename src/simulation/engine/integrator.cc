@@ -258,15 +258,16 @@ void Integrator::Settle() {
   double last = kUnbounded;
   for (int pass = 0; pass < kMostSettling; ++pass) {
     const VecX before = Eigen::Map<const VecX>(d_->qfrc_applied, m_->nv);
-    const VecX sizes = LoadFrictionOf(&s_);
+    const ConstraintSystem::FrictionByLoad found = LoadFrictionOf(&s_);
     double change = 0.0, largest = 0.0;
     for (const size_t e : s_.loaded) {
-      const double size = sizes[static_cast<Eigen::Index>(e)];
+      const auto k = static_cast<Eigen::Index>(e);
       const double unit = units[s_.engine.elements[e].dof];
-      change = std::max(change, unit * std::abs(size - s_.system.load_friction(e)));
-      largest = std::max(largest, unit * size);
+      change = std::max({change, unit * std::abs(found.size[k] - s_.system.load_friction(e)),
+                         unit * std::abs(found.force[k] - s_.system.load_force(e))});
+      largest = std::max(largest, unit * found.size[k]);
     }
-    s_.system.SetLoadFriction(sizes);
+    s_.system.SetLoadFriction(found);
     s_.ApplyForces(time_s_, at_);
     const Eigen::Map<const VecX> now(d_->qfrc_applied, m_->nv);
     change = std::max(change, (now - before).cwiseProduct(units).cwiseAbs().maxCoeff());

@@ -20,6 +20,18 @@ const ForceElement& ElementOf(const Session& s, size_t e) {
 
 double SizeOf(const BearingLoad& load) { return load.colwise().norm().sum(); }
 
+double OfCoupling(const BearingLoad& load) { return load(0, 2); }
+
+const FrictionLaw& LawOf(const Session& s, size_t e) {
+  return std::get<FrictionLaw>(ElementOf(s, e).law);
+}
+double SkewOf(const Session& s, size_t e) { return LawOf(s, e).skew / LawOf(s, e).coefficient; }
+
+ConstraintSystem::FrictionByLoad NoFriction(const Session& s) {
+  const VecX none = VecX::Zero(static_cast<Eigen::Index>(s.engine.mechanism->elements.size()));
+  return {.size = none, .force = none};
+}
+
 double LargestOf(const std::vector<BearingLoad>& loads) {
   double largest = 0.0;
   for (const BearingLoad& load : loads) largest = std::max(largest, SizeOf(load));
@@ -37,13 +49,15 @@ std::vector<size_t> LoadedElements(const Mechanism& mechanism) {
   return loaded;
 }
 
-VecX LoadFrictionOf(Session* session) {
-  VecX sizes = VecX::Zero(static_cast<Eigen::Index>(session->engine.mechanism->elements.size()));
+ConstraintSystem::FrictionByLoad LoadFrictionOf(Session* session) {
+  ConstraintSystem::FrictionByLoad found = NoFriction(*session);
   const std::vector<BearingLoad> loads = session->recorder.LoadsOf(session->loaded, session->loads);
   for (size_t d = 0; d < loads.size(); ++d) {
-    sizes[static_cast<Eigen::Index>(session->loaded[d])] = SizeOf(loads[d]);
+    const auto e = static_cast<Eigen::Index>(session->loaded[d]);
+    found.size[e] = SizeOf(loads[d]);
+    found.force[e] = SkewOf(*session, session->loaded[d]) * OfCoupling(loads[d]);
   }
-  return sizes;
+  return found;
 }
 
 LoadFriction::LoadFriction(Session* session) : s_(*session) {
@@ -79,28 +93,31 @@ void LoadFriction::FindLoads() {
   P_.assign(s_.loaded.size(), std::vector<BearingLoad>(s_.loaded.size()));
   unit_.resize(found_.size(), count);
   sign_.setZero(count);
+  skew_.setZero(count);
   for (size_t d = 0; d < s_.loaded.size(); ++d) {
     const size_t e = s_.loaded[d];
+    const auto k = static_cast<Eigen::Index>(d);
     const ElementMotion at = ElementMotionOf(s_.system, e);
-    if (!at.rests) sign_[static_cast<Eigen::Index>(d)] = std::copysign(1.0, at.rate);
+    if (!at.rests) sign_[k] = std::copysign(1.0, at.rate);
+    skew_[k] = SkewOf(s_, e);
+    const bool acts = !at.rests || skew_[k] != 0.0;
     const VecX tau = -ElementGradient(s_.system, e);
     if (s_.shared) {
       s_.solver.SolveLeastDriven(tau);
     } else {
       s_.solver.SolveForcesHere(tau);
     }
-    unit_.col(static_cast<Eigen::Index>(d)) = s_.system.force();
-    const double size = LargestOf(p_);  // as it will be: differences keep their digits
-    const double force = at.rests ? 0.0 : -size * sign_[static_cast<Eigen::Index>(d)];
-    s_.system.force() = found_ + force * unit_.col(static_cast<Eigen::Index>(d));
+    unit_.col(k) = s_.system.force();
+    // As large as it will be: differences keep their digits.
+    const double force = LargestOf(p_) * (sign_[k] > 0.0 ? -1.0 : 1.0);
+    s_.system.force() = found_ + force * unit_.col(k);
     // The element's own force is in no reaction.
-    VecX own = VecX::Zero(static_cast<Eigen::Index>(s_.engine.mechanism->elements.size()));
-    own[static_cast<Eigen::Index>(e)] = size;
-    s_.system.SetLoadFriction(own);
+    ConstraintSystem::FrictionByLoad own = NoFriction(s_);
+    own.force[static_cast<Eigen::Index>(e)] = force;
+    s_.system.SetLoadFriction(std::move(own));
     const std::vector<BearingLoad> moved = s_.recorder.LoadsOf(s_.loaded, s_.loads);
-    for (size_t k = 0; k < moved.size(); ++k) {
-      P_[k][d] =
-          at.rests ? BearingLoad(BearingLoad::Zero()) : BearingLoad((moved[k] - p_[k]) / force);
+    for (size_t i = 0; i < moved.size(); ++i) {
+      P_[i][d] = acts ? BearingLoad((moved[i] - p_[i]) / force) : BearingLoad(BearingLoad::Zero());
     }
   }
   s_.system.force() = found_;
@@ -129,46 +146,64 @@ void LoadFriction::CheckUnique() {
   s_.system.force() = found_;
 }
 
-// S_e − |p_e − Σ_d P_ed s_d S_d| = 0.
+double LoadFriction::Force(Eigen::Index d) const {
+  return skew_[d] * v_[d] - sign_[d] * std::abs(v_[d]);
+}
+
+// v_e − (p_e + Σ_d P_ed F_d) = 0, or with the size of that.
 bool LoadFriction::SolveLoads() {
   const auto count = static_cast<Eigen::Index>(p_.size());
-  S_.resize(count);
-  for (Eigen::Index e = 0; e < count; ++e) S_[e] = SizeOf(p_[static_cast<size_t>(e)]);
-  VecX rest(count);
+  const auto of_coupling = [&](Eigen::Index e) {
+    return LawOf(s_, s_.loaded[static_cast<size_t>(e)]).coupling >= 0;
+  };
+  v_.resize(count);
+  for (Eigen::Index e = 0; e < count; ++e) {
+    const BearingLoad& p = p_[static_cast<size_t>(e)];
+    v_[e] = of_coupling(e) ? OfCoupling(p) : SizeOf(p);
+  }
+  VecX rest(count), by_v(count);
   MatX slope(count, count);
   for (int step = 0; step < kMostSteps; ++step) {
+    by_v = skew_ - sign_.cwiseProduct(v_.cwiseSign());
     for (Eigen::Index e = 0; e < count; ++e) {
       const auto k = static_cast<size_t>(e);
       BearingLoad v = p_[k];
-      for (Eigen::Index d = 0; d < count; ++d)
-        v -= P_[k][static_cast<size_t>(d)] * sign_[d] * S_[d];
-      BearingLoad along = v;
-      for (int c = 0; c < 3; ++c) along.col(c).stableNormalize();  // zero stays zero
-      rest[e] = S_[e] - SizeOf(v);
+      for (Eigen::Index d = 0; d < count; ++d) v += P_[k][static_cast<size_t>(d)] * Force(d);
+      BearingLoad along = BearingLoad::Zero();
+      if (of_coupling(e)) {
+        along(0, 2) = 1.0;
+      } else {
+        along = v;
+        for (int c = 0; c < 3; ++c) along.col(c).stableNormalize();  // zero stays zero
+      }
+      rest[e] = v_[e] - (of_coupling(e) ? OfCoupling(v) : SizeOf(v));
       for (Eigen::Index d = 0; d < count; ++d) {
-        slope(e, d) = (e == d ? 1.0 : 0.0) +
-                      along.cwiseProduct(P_[k][static_cast<size_t>(d)]).sum() * sign_[d];
+        slope(e, d) = (e == d ? 1.0 : 0.0) -
+                      along.cwiseProduct(P_[k][static_cast<size_t>(d)]).sum() * by_v[d];
       }
     }
     const VecX change = slope.partialPivLu().solve(rest);
-    S_ -= change;
-    if (change.cwiseAbs().maxCoeff() <= kLoadSettled * S_.cwiseAbs().maxCoeff()) {
-      return S_.minCoeff() >= 0.0;
+    v_ -= change;
+    if (change.cwiseAbs().maxCoeff() > kLoadSettled * v_.cwiseAbs().maxCoeff()) continue;
+    for (Eigen::Index e = 0; e < count; ++e) {
+      if (!of_coupling(e) && v_[e] < 0.0) return false;
     }
+    return true;
   }
   return false;
 }
 
 void LoadFriction::Apply() {
-  VecX sizes = VecX::Zero(static_cast<Eigen::Index>(s_.engine.mechanism->elements.size()));
+  ConstraintSystem::FrictionByLoad friction = NoFriction(s_);
   VecX force = found_;
   for (size_t d = 0; d < s_.loaded.size(); ++d) {
-    const auto k = static_cast<Eigen::Index>(d);
-    sizes[static_cast<Eigen::Index>(s_.loaded[d])] = S_[k];
-    force -= sign_[k] * S_[k] * unit_.col(k);
+    const auto k = static_cast<Eigen::Index>(d), e = static_cast<Eigen::Index>(s_.loaded[d]);
+    friction.size[e] = std::abs(v_[k]);
+    friction.force[e] = skew_[k] * v_[k];
+    force += Force(k) * unit_.col(k);
   }
   s_.system.force() = force;
-  s_.system.SetLoadFriction(sizes);
+  s_.system.SetLoadFriction(std::move(friction));
 }
 
 namespace {
@@ -213,10 +248,7 @@ HeldShares::HeldShares(Session* session) : s_(*session) {
   if (held < 2) return;
   found_ = s_.system.force();
   held_ = force;
-  load_friction_.setZero(static_cast<Eigen::Index>(s_.engine.mechanism->elements.size()));
-  for (const size_t e : s_.loaded) {
-    load_friction_[static_cast<Eigen::Index>(e)] = s_.system.load_friction(e);
-  }
+  load_friction_ = s_.system.load_friction();
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const double change = Share(direction, load);
     if (change <= kSharesSettled * held_.cwiseAbs().maxCoeff()) return;

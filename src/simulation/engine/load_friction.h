@@ -1,12 +1,13 @@
 // Friction that grows with the joint's own reaction, or with a coupling's force, on MuJoCo's
 // forces.
 //
-//   F_e = −S_e sign q̇_e,  S_e = |p_e + Σ_d P_ed F_d|,  (1) of FrictionLaw                     (1)
+//   F_e = −|v_e| sign q̇_e + (ε/μ)_e v_e,  v_e = p_e + Σ_d P_ed F_d,  (1) of FrictionLaw        (1)
 // p: loads of the bearings without such friction, as the recorder reads them (BearingLoad, |p| the
-// sum of its columns' lengths); P: what a unit force F_d adds, with Jᵀλ = −u_d. Where the motion is
-// commanded, friction changes forces only: it is found where forces are recorded and is not
-// applied. Newton on S. Where DOFs move by forces, MuJoCo is loaded by (1) by the loads that it
-// finds itself, until they no longer change (Integrator::Settle); what rests breaks away beyond Fs
+// sum of its columns' lengths, p itself of a coupling, whose ε alone is not 0); P: what a unit
+// force F_d adds, with Jᵀλ = −u_d. Where the motion is commanded, friction changes forces only: it
+// is found where forces are recorded and is not applied. Newton on v. Where DOFs move by forces,
+// MuJoCo is loaded by (1) by the loads that it finds itself, until they no longer change
+// (Integrator::Settle); what rests breaks away beyond Fs
 // + S.
 #pragma once
 
@@ -17,8 +18,8 @@ namespace mbv::simulation {
 /// Indices of the elements with friction by load.
 [[nodiscard]] std::vector<size_t> LoadedElements(const Mechanism& mechanism);
 
-/// S_e per force element, by the data's accelerations and constraint forces.
-[[nodiscard]] VecX LoadFrictionOf(Session* session);
+/// Per force element, by the data's accelerations and constraint forces.
+[[nodiscard]] ConstraintSystem::FrictionByLoad LoadFrictionOf(Session* session);
 
 /// In commanded motion adds (1) to the session's constraint forces for as long as it lives. What
 /// goes wrong is in Session::trouble, in all motions also that a load is not unique.
@@ -33,6 +34,7 @@ class LoadFriction {
   void FindLoads();
   void CheckUnique();
   [[nodiscard]] bool SolveLoads();
+  [[nodiscard]] double Force(Eigen::Index d) const;
   void Apply();
 
   Session& s_;
@@ -40,7 +42,8 @@ class LoadFriction {
   std::vector<BearingLoad> p_;               // per loaded element [N or N m]
   std::vector<std::vector<BearingLoad>> P_;  // [e][d]
   MatX unit_;                                // constraint forces per unit of each
-  VecX sign_, S_;                            // of q̇; friction [N or N m]
+  VecX sign_, skew_;                         // of q̇; ε/μ
+  VecX v_;                                   // signed of couplings, else its size [N or N m]
 };
 
 // How several joints at rest share their load, where statics does not determine it.
@@ -65,8 +68,8 @@ class HeldShares {
   [[nodiscard]] double Share(const VecX& direction, double load);
 
   Session& s_;
-  VecX found_, held_;   // constraint forces, of friction
-  VecX load_friction_;  // by MuJoCo's shares
+  VecX found_, held_;                               // constraint forces, of friction
+  ConstraintSystem::FrictionByLoad load_friction_;  // by MuJoCo's shares
 };
 
 }  // namespace mbv::simulation

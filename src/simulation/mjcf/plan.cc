@@ -387,7 +387,7 @@ bool IsPlainFriction(const Mechanism& mechanism, const ForceElement& element) {
   if (law == nullptr || element.joint < 0 || element.bushing >= 0) return false;
   const JointKind kind = mechanism.joints[static_cast<size_t>(element.joint)].kind;
   const bool scalar = kind != JointKind::kFree && !IsOfBall(kind, element.coordinate);
-  return scalar && law->breakaway == law->coulomb && !law->by_load();
+  return scalar && law->breakaway == law->coulomb && !law->by_load() && law->resists == 0;
 }
 
 PlannedForces ForcesOfJoint(const Mechanism& mechanism, int joint, int coordinate) {

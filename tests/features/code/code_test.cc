@@ -178,7 +178,7 @@ TEST_F(CodeOfAnkle, ThatDoesNotCompileDiffers) {
 // The table: all of the range is proved, the same poses as by the way from home, and fewer steps
 // than proved leave more.
 TEST_F(CodeOfAnkle, StartsFromAProvedTable) {
-  const CodeResult result = Make({.ranges = AnkleRanges(), .states = 300});
+  const CodeResult result = Make({.ranges = AnkleRanges(), .cells = 32, .states = 300});
   ASSERT_EQ(result.judgements.size(), 3U) << Described(result);
   EXPECT_TRUE(result.agrees()) << Described(result);
   EXPECT_EQ(result.table_share, 1.0);
@@ -193,7 +193,8 @@ TEST_F(CodeOfAnkle, StartsFromAProvedTable) {
   }
   const std::filesystem::path file = place_.folder() / "fewer.h";
   ASSERT_EQ(WriteFile(file, fewer), "");
-  const CodeResult worse = Make({.ranges = AnkleRanges(), .states = 100, .check = file.string()});
+  const CodeResult worse =
+      Make({.ranges = AnkleRanges(), .cells = 32, .states = 100, .check = file.string()});
   ASSERT_EQ(worse.judgements.size(), 2U) << Described(worse);
   EXPECT_TRUE(worse.judgements[0].agrees());
   EXPECT_FALSE(worse.judgements[1].agrees()) << Described(worse);
@@ -202,7 +203,7 @@ TEST_F(CodeOfAnkle, StartsFromAProvedTable) {
 // Ends before the loops do not close any more: nothing out of reach is served.
 TEST_F(CodeOfAnkle, TableEndsWhereTheRodsDo) {
   const std::vector<CodeRange> wide = {{"ankle.0", -2.0, 2.0}, {"ankle.1", -0.9, 0.9}};
-  const CodeResult result = Make({.ranges = wide, .states = 2000});
+  const CodeResult result = Make({.ranges = wide, .cells = 16, .states = 1000});
   ASSERT_EQ(result.judgements.size(), 3U) << Described(result);
   EXPECT_GT(result.table_share, 0.3);
   EXPECT_LT(result.table_share, 0.95);
@@ -212,18 +213,19 @@ TEST_F(CodeOfAnkle, TableEndsWhereTheRodsDo) {
   std::string all = FileOf(result, "parallel_ankle.h");
   const size_t from = all.find("{", all.find("proved[] = ")), to = all.find("}", from);
   std::string bytes;
-  for (int k = 0; k < 64 * 64 / 8; ++k) bytes += (k > 0 ? ", " : "") + std::string("255");
+  for (int k = 0; k < 16 * 16 / 8; ++k) bytes += (k > 0 ? ", " : "") + std::string("255");
   all.replace(from + 1, to - from - 1, bytes);
   const std::filesystem::path file = place_.folder() / "all.h";
   ASSERT_EQ(WriteFile(file, all), "");
-  const CodeResult wrong = Make({.ranges = wide, .states = 2000, .check = file.string()});
+  const CodeResult wrong =
+      Make({.ranges = wide, .cells = 16, .states = 1000, .check = file.string()});
   ASSERT_EQ(wrong.judgements.size(), 2U) << Described(wrong);
   EXPECT_TRUE(wrong.judgements[0].agrees()) << Described(wrong);
   EXPECT_FALSE(wrong.judgements[1].agrees()) << Described(wrong);
 }
 
 TEST_F(CodeOfAnkle, LooksUpWithinTheBound) {
-  CodeResult result = Make({.ranges = AnkleRanges(0.5), .states = 2000});
+  CodeResult result = Make({.ranges = AnkleRanges(0.5), .cells = 16, .states = 1000});
   ASSERT_TRUE(result.lookup.has_value()) << Described(result);
   EXPECT_EQ(result.lookup_share, 1.0);
   for (Eigen::Index k = 0; k < 2; ++k) {
@@ -251,8 +253,10 @@ TEST_F(CodeOfAnkle, LooksUpWithinTheBound) {
 
 // The bound follows the spacing's square, as of interpolation.
 TEST_F(CodeOfAnkle, LookupBoundFallsWithTheSquareOfTheSpacing) {
-  const CodeResult wide = Make({.ranges = AnkleRanges(0.5), .states = 20, .compile = false});
-  const CodeResult narrow = Make({.ranges = AnkleRanges(0.25), .states = 20, .compile = false});
+  const CodeResult wide =
+      Make({.ranges = AnkleRanges(0.5), .cells = 16, .states = 20, .compile = false});
+  const CodeResult narrow =
+      Make({.ranges = AnkleRanges(0.25), .cells = 16, .states = 20, .compile = false});
   ASSERT_TRUE(wide.lookup && narrow.lookup);
   const double ratio = wide.lookup->bound[0] / narrow.lookup->bound[0];
   EXPECT_GT(ratio, 3.5);
@@ -261,7 +265,8 @@ TEST_F(CodeOfAnkle, LookupBoundFallsWithTheSquareOfTheSpacing) {
 
 // Of what a controller calls in each cycle.
 TEST_F(CodeOfAnkle, NeedsLittleStackAndNoLibrary) {
-  const CodeResult result = Make({.ranges = AnkleRanges(0.2), .states = 20, .compile = false});
+  const CodeResult result =
+      Make({.ranges = AnkleRanges(0.2), .cells = 16, .states = 20, .compile = false});
   const std::filesystem::path folder = place_.folder();
   for (const auto& [name, content] : result.files) ASSERT_EQ(WriteFile(folder / name, content), "");
   ASSERT_EQ(WriteFile(folder / "cycle.c", R"(#include "parallel_ankle.h"
@@ -305,7 +310,8 @@ class CodeByCompiler : public CodeOfAnkle, public testing::WithParamInterface<st
 TEST_P(CodeByCompiler, PassesItsSelfTest) {
   const std::string& command = GetParam();
   const std::string compiler = command.substr(0, command.find(' '));
-  const CodeResult result = Make({.ranges = AnkleRanges(0.2), .states = 20, .compile = false});
+  const CodeResult result =
+      Make({.ranges = AnkleRanges(0.2), .cells = 16, .states = 20, .compile = false});
   const std::filesystem::path folder = place_.folder();
   for (const auto& [name, content] : result.files) ASSERT_EQ(WriteFile(folder / name, content), "");
   const bool arm = compiler.starts_with("arm");
