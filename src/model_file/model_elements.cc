@@ -528,7 +528,7 @@ bool ElementReader::ReadResists(const YamlMap& map, bool loaded, FrictionLaw* la
   }
   const auto word = yaml.Choice(*node, map.PathOf("resists"), {"positive", "negative"});
   if (!word || law == nullptr) return false;
-  law->resists = *word == "positive" ? 1 : -1;
+  law->resists = *word == 0 ? 1 : -1;
   return true;
 }
 

@@ -180,7 +180,7 @@ RunSummary FreeMotion::Start(const BodyStates& states) {
   RunSummary summary = dynamics_.Accelerate(0.0, &now_.states);
   now_.pivot = largest_pivot_ = dynamics_.pivot();
   if (summary.ok() && !friction_elements_.empty()) summary = BeginFriction();
-  NoteEvents();
+  if (summary.ok()) NoteEvents();
   return summary;
 }
 
