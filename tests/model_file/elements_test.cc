@@ -327,7 +327,7 @@ TEST(StopsAndCurves, WhatMeansNothingIsAFinding) {
       {"{kind: curve, joint: turn, points: [[0, 0], [1, 1]]}", "beyond"},
       {"{kind: curve, joint: turn, beyond: held}", "points"},
       {"{kind: curve, joint: turn, points: [[0, 0]], beyond: held}", "fewer than two points"},
-      {"{kind: curve, joint: turn, points: [[0, 0], [0, 1]], beyond: held}", "increasing"},
+      {"{kind: curve, joint: turn, points: [[0, 0], [0, 1]], beyond: held}", "must increase"},
       {"{kind: curve, joint: turn, points: [[0, 0], [1]], beyond: held}", "a list of 2"},
       {"{kind: curve, joint: turn, points_mm: [[0, 0], [1, 1]], beyond: held}", "not in that unit"},
       {"{kind: curve, joint: turn, points_rpm: [[0, 0], [1, 1]], beyond: held}",
