@@ -20,7 +20,7 @@
 #include "base/text.h"
 #include "cli/terminal.h"
 #include "model_file/mesh/read_mesh.h"
-#include "model_file/yaml/parsed_documents.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "verify/version.h"
 
 namespace mbv {

@@ -11,7 +11,7 @@
 #include "comparison/force_band.h"
 #include "comparison/force_scale.h"
 #include "comparison/motor_load.h"
-#include "mechanism/followed_state.h"
+#include "mechanism/motion.h"
 
 namespace mbv {
 

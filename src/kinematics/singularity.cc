@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "kinematics/command_rank.h"
-#include "kinematics/loop_rows.h"
+#include "kinematics/constraints.h"
 #include "kinematics/tree_motion.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/reach.h"

@@ -6,8 +6,8 @@
 
 #include "kinematics/constraints.h"
 #include "math/spatial.h"
-#include "mechanism/followed_state.h"
 #include "mechanism/joint_pose.h"
+#include "mechanism/motion.h"
 
 namespace mbv::internal {
 

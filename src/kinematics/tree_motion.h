@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "base/run_summary.h"
-#include "mechanism/followed_state.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 

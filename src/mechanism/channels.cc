@@ -1,6 +1,6 @@
 #include "mechanism/channels.h"
 
-#include "mechanism/followed_state.h"
+#include "mechanism/motion.h"
 
 namespace mbv {
 namespace {

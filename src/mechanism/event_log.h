@@ -17,7 +17,7 @@ namespace mbv {
 /// Makes events of what elements do from node to node. No force follows from it.
 class EventLog {
  public:
-  /// `piece` tells apart what a curve does on both sides of a knot.
+  /// `piece` distinguishes what a curve does on both sides of a knot.
   void Note(const ForceElement& element, double time_s, Happening now, int piece = 0);
   /// In the order of their times.
   [[nodiscard]] const std::vector<MotionEvent>& events() const { return events_; }

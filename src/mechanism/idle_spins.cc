@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "math/parallel_transport.h"
+#include "math/spatial.h"
 
 namespace mbv {
 namespace {

@@ -1,6 +1,7 @@
 // Where the named parts of a mechanism are, for labels.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -29,5 +30,17 @@ struct NamedPlace {
 /// drives and joints. A name that several have stands for the first.
 [[nodiscard]] std::vector<NamedPlace> PlacesFor(const Mechanism& mechanism,
                                                 const std::vector<std::string>& words);
+
+// Colours that a shape may have, for pictures and for the MJCF alike.
+
+/// Red, green, blue, opacity, each 0 … 1, of a name ("steel", "accent", …) or of "#rrggbb[aa]";
+/// any other text gives grey.
+[[nodiscard]] std::array<double, 4> ShapeColor(const std::string& color);
+
+/// True for the names and the "#…" form that ShapeColor knows.
+[[nodiscard]] bool IsShapeColor(const std::string& color);
+
+/// The names, sorted.
+[[nodiscard]] std::vector<std::string> ShapeColorNames();
 
 }  // namespace mbv

@@ -11,7 +11,7 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/spanning_tree.h"
 #include "model_file/model_bodies.h"
-#include "model_file/model_signals.h"
+#include "model_file/model_values.h"
 #include "model_file/yaml/yaml_reader.h"
 
 // Findings about a model as a whole, at the places where its parts are described. Internal to the

@@ -8,7 +8,6 @@
 #include "mechanism/mechanism.h"
 #include "model_file/model_joints.h"
 #include "model_file/model_names.h"
-#include "model_file/model_signals.h"
 #include "model_file/model_values.h"
 
 namespace mbv::internal {

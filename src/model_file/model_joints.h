@@ -9,7 +9,6 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/spanning_tree.h"
 #include "model_file/model_names.h"
-#include "model_file/model_signals.h"
 #include "model_file/model_values.h"
 
 namespace mbv::internal {

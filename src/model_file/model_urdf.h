@@ -10,7 +10,6 @@
 #include "mechanism/mechanism.h"
 #include "model_file/model_bodies.h"
 #include "model_file/model_joints.h"
-#include "model_file/model_signals.h"
 #include "model_file/model_values.h"
 #include "model_file/urdf/urdf_import.h"
 #include "model_file/yaml/yaml_reader.h"

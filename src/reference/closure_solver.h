@@ -5,7 +5,7 @@
 // command; the matrix is factored once near the solution and then refined against. Redundant joint
 // rows are dropped and their residuals checked. Idle spins (mechanism/idle_spins.h) have a row
 // each: no Newton step turns them, and their rates are zero. From sample to sample their lines are
-// transported parallel (math/parallel_transport.h); the first sample takes the least turn from
+// transported parallel (math/spatial.h); the first sample takes the least turn from
 // home.
 #pragma once
 
@@ -14,8 +14,8 @@
 
 #include "base/run_summary.h"
 #include "kinematics/tree_motion.h"
-#include "math/parallel_transport.h"
 #include "math/rate_extrapolation.h"
+#include "math/spatial.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "base/demand.h"
-#include "mechanism/colors.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/named_places.h"
 #include "render/annotations.h"

@@ -5,7 +5,7 @@
 #include <map>
 #include <numbers>
 
-#include "mechanism/colors.h"
+#include "mechanism/named_places.h"
 #include "model_file/mesh/decimate.h"
 
 namespace mbv::render {

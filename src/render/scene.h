@@ -24,8 +24,8 @@ struct Material {
   float emission = 0.0F;   ///< light of its own, 0 … 1
 };
 
-/// The material of a shape's colour (mechanism/colors.h) or of a mark: closure, gap, pull, push,
-/// x_axis, y_axis, z_axis, path.
+/// The material of a shape's colour (mechanism/named_places.h) or of a mark: closure, gap, pull,
+/// push, x_axis, y_axis, z_axis, path.
 [[nodiscard]] Material MaterialOf(const std::string& color);
 
 /// Shapes of these materials ("sea", "hull", "deck") are surroundings: drawn, but the automatic

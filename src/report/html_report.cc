@@ -14,7 +14,6 @@
 #include "report/plot_points.h"
 #include "report/result.h"
 #include "report/sections.h"
-#include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"
 

@@ -4,7 +4,6 @@
 #include "report/load_figures.h"
 #include "report/result.h"
 #include "report/sections.h"
-#include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"
 

@@ -7,7 +7,6 @@
 #include "report/plot_points.h"
 #include "report/report.h"
 #include "report/sections.h"
-#include "report/singular_poses.h"
 #include "report/sizing.h"
 #include "report/source_model_report.h"
 #include "report/terminal_text.h"

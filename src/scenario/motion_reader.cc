@@ -10,7 +10,6 @@
 #include "base/text.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility.h"
-#include "mechanism/followed_state.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "model_file/yaml/value_reader.h"

@@ -7,7 +7,6 @@
 
 #include "base/files.h"
 #include "base/text.h"
-#include "mechanism/colors.h"
 #include "mechanism/named_places.h"
 
 namespace mbv {

@@ -6,7 +6,6 @@
 
 #include "base/run_summary.h"
 #include "mechanism/mechanism.h"
-#include "model_file/load_bodies.h"
 #include "model_file/load_model.h"
 
 // Robots of foreign formats.

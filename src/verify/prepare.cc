@@ -10,7 +10,7 @@
 #include "kinematics/home.h"
 #include "math/spatial.h"
 #include "mechanism/channels.h"
-#include "mechanism/followed_state.h"
+#include "mechanism/motion.h"
 #include "mechanism/reach.h"
 #include "model_file/load_model.h"
 #include "plot/figure.h"

@@ -8,7 +8,7 @@
 
 #include "base/demand.h"
 #include "features/study/study_bench.h"
-#include "model_file/yaml/parsed_documents.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "tests/support/source_dir.h"
 #include "verify/prepare.h"
 

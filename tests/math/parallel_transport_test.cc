@@ -1,5 +1,4 @@
 // Parallel transport of a line against the motion that it comes from.
-#include "math/parallel_transport.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "mechanism/colors.h"
+#include "mechanism/named_places.h"
 
 #include <gtest/gtest.h>
 

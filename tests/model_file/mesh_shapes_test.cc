@@ -1,7 +1,6 @@
 // Meshes of model files and URDF files: found, read, written back, or left out with one warning.
 #include <gtest/gtest.h>
 
-#include "model_file/load_bodies.h"
 #include "model_file/load_model.h"
 #include "model_file/mesh/mass_properties.h"
 #include "model_file/urdf/urdf_import.h"

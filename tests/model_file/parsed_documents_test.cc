@@ -1,4 +1,4 @@
-#include "model_file/yaml/parsed_documents.h"
+#include "model_file/yaml/yaml_reader.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mechanism/colors.h"
+#include "mechanism/named_places.h"
 #include "render/annotations.h"
 #include "render/camera.h"
 #include "tests/mechanisms/rendered.h"

@@ -1,4 +1,4 @@
-#include "features/certify/certificate_report.h"
+#include "features/certify/certify.h"
 
 #include <fmt/format.h>
 #include <algorithm>

@@ -24,6 +24,8 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/reduced_model.h"
+#include "report/report.h"
+#include "verify/prepare.h"
 
 namespace mbv {
 
@@ -125,5 +127,12 @@ struct ExactDerivatives : ForceSlopes {
 [[nodiscard]] std::string DifferentiateExactly(const Mechanism& mechanism, const Motion& motion,
                                                const BodyStates& near, const CommandSample& command,
                                                ExactDerivatives* out);
+
+// A certificate as it is shown, and what it does to a verdict.
+
+/// Certifies a judged run, of the mechanism with the scenario's common parameters: adds
+/// `certificate` to its parts. A computed witness that is wrong by proof takes an agreement away,
+/// and names the culprit of a disagreement.
+void AddCertificate(const Prepared& prepared, const CertifyOptions& options, Report* report);
 
 }  // namespace mbv

@@ -19,7 +19,7 @@
 #include "cli/terminal.h"
 #include "math/bytes.h"
 #include "mechanism/motion.h"
-#include "model_file/yaml/parsed_documents.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "scenario/find_model.h"
 #include "scenario/section_readers.h"
 #include "simulation/engine/simulation.h"

@@ -19,8 +19,8 @@
 #include "mechanism/motion.h"
 #include "model_file/element_text.h"
 #include "model_file/load_model.h"
-#include "model_file/yaml/parsed_documents.h"
 #include "model_file/yaml/units.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "reference/reference.h"
 #include "verify/drive_by.h"
 

@@ -24,7 +24,6 @@
 #include "cli/terminal.h"
 #include "features/paper/packed_run.h"
 #include "model_file/mesh/read_mesh.h"
-#include "model_file/yaml/parsed_documents.h"
 #include "model_file/yaml/yaml_reader.h"
 #include "scenario/find_model.h"
 #include "verify/check_file.h"

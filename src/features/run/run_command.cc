@@ -14,7 +14,7 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
-#include "features/certify/certificate_report.h"
+#include "features/certify/certify.h"
 #include "features/linearise/linearise.h"
 #include "features/run/default_setup.h"
 #include "features/run/run_scenario.h"

@@ -25,7 +25,7 @@
 #include "features/study/study_file.h"
 #include "features/study/study_report.h"
 #include "features/study/summary.h"
-#include "model_file/yaml/parsed_documents.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "report/report.h"
 #include "scenario/find_model.h"
 #include "verify/version.h"

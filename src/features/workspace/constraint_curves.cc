@@ -8,7 +8,7 @@
 #include <map>
 #include <optional>
 
-#include "kinematics/loop_rows.h"
+#include "kinematics/constraints.h"
 
 namespace mbv {
 namespace {

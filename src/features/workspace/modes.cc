@@ -11,8 +11,8 @@
 
 #include "base/text.h"
 #include "kinematics/assembly.h"
+#include "kinematics/constraints.h"
 #include "kinematics/home.h"
-#include "kinematics/loop_rows.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
 #include "report/page.h"

@@ -20,7 +20,7 @@
 #include "features/workspace/workspace.h"
 #include "math/resume.h"
 #include "model_file/load_model.h"
-#include "model_file/yaml/parsed_documents.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "scenario/find_model.h"
 #include "verify/model_text.h"
 #include "verify/version.h"

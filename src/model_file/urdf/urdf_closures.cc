@@ -12,7 +12,6 @@
 #include <sstream>
 
 #include "base/text.h"
-#include "math/parallel_transport.h"
 #include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"

@@ -6,7 +6,6 @@
 #include <functional>
 
 #include "base/markup.h"
-#include "math/parallel_transport.h"
 #include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "model_file/mesh/read_mesh.h"

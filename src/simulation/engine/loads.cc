@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "math/spatial.h"
-#include "mechanism/followed_state.h"
+#include "mechanism/motion.h"
 #include "mechanism/spanning_tree.h"
 #include "simulation/engine/recorder.h"
 

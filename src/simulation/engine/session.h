@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/run_summary.h"
-#include "math/parallel_transport.h"
+#include "math/spatial.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/motion.h"
 #include "simulation/engine/closure_solver.h"
@@ -47,7 +47,7 @@ struct Step {
 //     n·ω = Σ n·w_j q̇_j,  n·ε = Σ n·(w_j q̈_j + ẇ_j q̇_j)                                         (2)
 //   and as n·ω of ν is 1, these become zero by q̇ −= (n·ω) ν, q̈ −= (n·ε) ν. In inverse mode, where
 // nothing integrates, the lines are transported parallel from sample to sample
-// (math/parallel_transport.h); the first one takes the least turns from home.
+// (math/spatial.h); the first one takes the least turns from home.
 
 class SpinStopper {
  public:

@@ -8,7 +8,7 @@
 #include <string>
 #include <variant>
 
-#include "mechanism/colors.h"
+#include "mechanism/named_places.h"
 
 namespace mbv::mjcf {
 namespace {

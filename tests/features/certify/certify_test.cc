@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <functional>
 
-#include "features/certify/certificate_report.h"
 #include "features/certify/exact_numbers.h"
 #include "features/run/run_scenario.h"
 #include "model_file/load_model.h"

@@ -12,7 +12,7 @@
 #include "features/study/study_bench.h"
 #include "features/study/study_file.h"
 #include "mechanism/motion.h"
-#include "model_file/yaml/parsed_documents.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "scenario/load_scenario.h"
 #include "tests/support/source_dir.h"
 

@@ -1,4 +1,4 @@
-#include "math/parallel_transport.h"
+#include "math/spatial.h"
 
 #include <Eigen/Geometry>
 #include <array>
