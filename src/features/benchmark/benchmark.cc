@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include "base/text.h"
 #include "comparison/verdict.h"
@@ -58,14 +60,40 @@ Eigen::Index RowAt(const Trace& trace, double time_s) {
   return next - trace.time_s.begin();
 }
 
+// A signal by sample; empty where the trace has none. `OUTPUT.omega.x`, `.y` and `.z` are the
+// angular velocity in the output's own axes, by its roll, pitch and yaw and their rates.
+Eigen::ArrayXd SignalOf(const std::string& name, const Trace& trace) {
+  const int column = trace.Find(name);
+  if (column >= 0) return trace.values.col(column);
+  constexpr std::string_view kOmega = ".omega.";
+  const size_t at = name.rfind(kOmega);
+  if (at == std::string::npos) return {};
+  const std::string output = name.substr(0, at), axis = name.substr(at + kOmega.size());
+  std::array<Eigen::ArrayXd, 3> angle, rate;
+  for (size_t k = 0; k < 3; ++k) {
+    const int component = static_cast<int>(k) + 3;
+    const int a = trace.Find(Quantity::kPose, output, component);
+    const int r = trace.Find(Quantity::kPoseVelocity, output, component);
+    if (a < 0 || r < 0) return {};
+    angle[k] = trace.values.col(a);
+    rate[k] = trace.values.col(r);
+  }
+  const auto& [roll, pitch, yaw] = angle;
+  const auto& [roll_rate, pitch_rate, yaw_rate] = rate;
+  if (axis == "x") return roll_rate - yaw_rate * pitch.sin();
+  if (axis == "y") return pitch_rate * roll.cos() + yaw_rate * roll.sin() * pitch.cos();
+  if (axis == "z") return yaw_rate * roll.cos() * pitch.cos() - pitch_rate * roll.sin();
+  return {};
+}
+
 // What a trace has of a series, by instant; NaN where it has nothing.
 std::vector<double> ComputedValues(const PublishedSeries& series, const Trace& trace) {
   std::vector<double> values(series.time_s.size(), kNan);
-  const int column = trace.Find(series.channel);
-  if (column < 0) return values;
+  const Eigen::ArrayXd signal = SignalOf(series.channel, trace);
+  if (signal.size() == 0) return values;
   for (size_t k = 0; k < values.size(); ++k) {
     const Eigen::Index row = RowAt(trace, series.time_s[k]);
-    if (row >= 0) values[k] = trace.values(row, column);
+    if (row >= 0) values[k] = signal(row);
   }
   return values;
 }
