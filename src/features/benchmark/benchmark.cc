@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <string_view>
 
 #include "base/text.h"
 #include "comparison/verdict.h"
@@ -60,15 +59,9 @@ Eigen::Index RowAt(const Trace& trace, double time_s) {
   return next - trace.time_s.begin();
 }
 
-// A signal by sample; empty where the trace has none. `OUTPUT.omega.x`, `.y` and `.z` are the
-// angular velocity in the output's own axes, by its roll, pitch and yaw and their rates.
-Eigen::ArrayXd SignalOf(const std::string& name, const Trace& trace) {
-  const int column = trace.Find(name);
-  if (column >= 0) return trace.values.col(column);
-  constexpr std::string_view kOmega = ".omega.";
-  const size_t at = name.rfind(kOmega);
-  if (at == std::string::npos) return {};
-  const std::string output = name.substr(0, at), axis = name.substr(at + kOmega.size());
+// The angular velocity of an output in its own axes, about one of them, by its roll, pitch and yaw
+// and their rates; empty where the trace lacks one.
+Eigen::ArrayXd SpinOf(const std::string& output, int axis, const Trace& trace) {
   std::array<Eigen::ArrayXd, 3> angle, rate;
   for (size_t k = 0; k < 3; ++k) {
     const int component = static_cast<int>(k) + 3;
@@ -80,16 +73,23 @@ Eigen::ArrayXd SignalOf(const std::string& name, const Trace& trace) {
   }
   const auto& [roll, pitch, yaw] = angle;
   const auto& [roll_rate, pitch_rate, yaw_rate] = rate;
-  if (axis == "x") return roll_rate - yaw_rate * pitch.sin();
-  if (axis == "y") return pitch_rate * roll.cos() + yaw_rate * roll.sin() * pitch.cos();
-  if (axis == "z") return yaw_rate * roll.cos() * pitch.cos() - pitch_rate * roll.sin();
-  return {};
+  if (axis == 0) return roll_rate - yaw_rate * pitch.sin();
+  if (axis == 1) return pitch_rate * roll.cos() + yaw_rate * roll.sin() * pitch.cos();
+  return yaw_rate * roll.cos() * pitch.cos() - pitch_rate * roll.sin();
+}
+
+// By sample; empty where the trace has none.
+Eigen::ArrayXd SignalOf(const PublishedSeries& series, const Trace& trace) {
+  if (!series.spins.empty()) return SpinOf(series.spins, series.axis, trace);
+  const int column = trace.Find(series.channel);
+  if (column < 0) return {};
+  return trace.values.col(column);
 }
 
 // What a trace has of a series, by instant; NaN where it has nothing.
 std::vector<double> ComputedValues(const PublishedSeries& series, const Trace& trace) {
   std::vector<double> values(series.time_s.size(), kNan);
-  const Eigen::ArrayXd signal = SignalOf(series.channel, trace);
+  const Eigen::ArrayXd signal = SignalOf(series, trace);
   if (signal.size() == 0) return values;
   for (size_t k = 0; k < values.size(); ++k) {
     const Eigen::Index row = RowAt(trace, series.time_s[k]);

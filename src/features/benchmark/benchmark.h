@@ -19,7 +19,9 @@ namespace mbv {
 
 /// Numbers of one signal, as published.
 struct PublishedSeries {
-  std::string channel;              ///< of a trace: "crank.position"
+  std::string channel;              ///< of a trace: "crank.position"; or, as a label, …
+  std::string spins;                ///< … the output whose angular velocity, in its own axes, …
+  int axis = -1;                    ///< … it is about this one
   std::string called;               ///< in the source: "j1.phi"
   std::vector<double> time_s;       ///< each one a sample of the scenario
   std::vector<double> values;       ///< as many, in the channel's SI unit

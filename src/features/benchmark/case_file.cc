@@ -154,12 +154,17 @@ class CaseReader {
 
   // A column of a table, or a value at an instant.
   void ReadSeries(const YamlNode& node, const std::string& path) {
-    const YamlMap map(&yaml_, &node, path,
-                      {"channel", "called", "table", "column", "value", "at_s", "uncertainty",
-                       "relative", "at_start", "until_s", "why", "proved", "scale"});
+    const YamlMap map(
+        &yaml_, &node, path,
+        {"channel", "angular_velocity", "axis", "called", "table", "column", "value", "at_s",
+         "uncertainty", "relative", "at_start", "until_s", "why", "proved", "scale"});
     if (!map.valid()) return;
     PublishedSeries series;
-    series.channel = RequiredText(map, "channel");
+    if (map.Has("angular_velocity")) {
+      ReadSpin(map, &series);
+    } else {
+      series.channel = RequiredText(map, "channel");
+    }
     series.uncertainty_why = RequiredText(map, "why");
     if (const YamlNode* proved = map.Find("proved")) {
       series.proved = yaml_.Flag(*proved, map.PathOf("proved")).value_or(false);
@@ -189,6 +194,19 @@ class CaseReader {
     ReadUncertainty(map, node, &series);
     if (series.called.empty()) series.called = series.channel;
     case_.published.push_back(std::move(series));
+  }
+
+  void ReadSpin(const YamlMap& map, PublishedSeries* series) {
+    if (const YamlNode* channel = map.Find("channel")) {
+      yaml_.Error(*channel, map.path() + " has both channel and angular_velocity");
+    }
+    series->spins = RequiredText(map, "angular_velocity");
+    const YamlNode* axis = map.Required("axis");
+    if (axis == nullptr) return;
+    const auto choice = yaml_.Choice(*axis, map.PathOf("axis"), {"x", "y", "z"});
+    if (!choice) return;
+    series->axis = static_cast<int>(*choice);
+    series->channel = fmt::format("{}: angular velocity about its {}", series->spins, axis->text);
   }
 
   void ReadColumn(const YamlMap& map, PublishedSeries* series) {

@@ -377,8 +377,11 @@ TEST(Mutate, PushedAndServoDrivesArePerturbedAsTheyAreDriven) {
 TEST(Mutate, ForwardPickAndPlaceSeesWhatInverseModeSees) {
   MutationOptions options = WithFaults();
   options.structural = false;
+  // Of each kind some: what acts, what does not, where home lies, the assembly, a range.
+  options.numbers = {"l1", "l3", "e", "m_p", "I_p_x", "arm_com", "home_z", "branch", "theta_max"};
   const MutationReport report = Mutate("scara_robot/pick_place", options);
   EXPECT_EQ(report.exit_code, 0) << ToText(report, false);
+  EXPECT_EQ(report.mutations.size(), options.numbers.size());
   for (const Mutation& m : report.mutations) {
     ASSERT_TRUE(m.inverse.has_value());
     EXPECT_EQ(m.own.by_force, m.inverse->by_force) << m.name << " " << m.reason;
