@@ -49,6 +49,12 @@ std::vector<Finding> FindUncoveredLoads(const Coverage& coverage, const Mechanis
     if (body.takes_loads) takers += (takers.empty() ? "" : ", ") + body.name;
   }
   std::vector<Finding> findings;
+  for (const Switch& one : motion.switches) {
+    if (one.body < 0) continue;
+    findings.push_back({.severity = Severity::kWarning,
+                        .message = fmt::format("the mass of {} changes over time", one.name),
+                        .hint = coverage.form + " takes constant masses"});
+  }
   for (const Load& load : motion.loads) {
     const std::string& name = mechanism.bodies[size_t(load.body)].name;
     const bool taken =

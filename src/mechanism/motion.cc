@@ -195,13 +195,28 @@ void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample) {
     }
   }
   EvaluateSwitches(motion, t_s, &sample->engaged);
+  EvaluatePayloads(motion, t_s, &sample->carried);
 }
 
 void EvaluateSwitches(const Motion& motion, double t_s, std::vector<double>* engaged) {
   for (const Switch& one : motion.switches) {
+    if (one.body >= 0) continue;
     if (engaged->size() <= one.element) engaged->resize(one.element + 1, 1.0);
     (*engaged)[one.element] = Evaluate(one.share, t_s).value;
   }
+}
+
+void EvaluatePayloads(const Motion& motion, double t_s, std::vector<double>* carried) {
+  for (const Switch& one : motion.switches) {
+    if (one.body < 0) continue;
+    const auto b = static_cast<size_t>(one.body);
+    if (carried->size() <= b) carried->resize(b + 1, 1.0);
+    (*carried)[b] = Evaluate(one.share, t_s).value;
+  }
+}
+
+bool HasPayloads(const Motion& motion) {
+  return std::ranges::any_of(motion.switches, [](const Switch& one) { return one.body >= 0; });
 }
 
 namespace {
@@ -241,7 +256,7 @@ std::vector<size_t> SwitchedOff(const Motion& motion, double from_s, double to_s
   constexpr int kLooks = 7;
   std::vector<size_t> off;
   for (const Switch& one : motion.switches) {
-    bool zero = true;
+    bool zero = one.body < 0;
     for (int k = 1; k < kLooks && zero; ++k) {
       zero = Evaluate(one.share, from_s + (to_s - from_s) * k / kLooks).value == 0.0;
     }

@@ -114,12 +114,14 @@ struct DriveForce {
   Profile force;  ///< [N] or [N m]
 };
 
-/// A force element that acts with a share of its force: a brake or clutch that is switched.
+/// A force element that acts with a share of its force: a brake or clutch that is switched. Or a
+/// body that has a share of its mass and inertia: a payload that is gripped and released. What
+/// joins it has its velocity already.
 struct Switch {
-  std::string name;  ///< of the element, or of a ball's three
-  size_t element =
-      0;          ///< index into Mechanism::elements; with dry friction, or a curve of the rate
-  Profile share;  ///< >= 0
+  std::string name;    ///< of the element, or of a ball's three, or of the body
+  size_t element = 0;  ///< index into Mechanism::elements: dry friction, or a curve of the rate; or
+  int body = -1;       ///< of this body instead
+  Profile share;       ///< >= 0
 };
 
 /// Where a DOF starts that moves by forces.
@@ -193,13 +195,17 @@ struct CommandSample {
   VecX position, velocity, acceleration;
   std::vector<LoadSample> loads;
   std::vector<double> engaged = {};  ///< BodyStates::engaged
+  std::vector<double> carried = {};  ///< BodyStates::carried
 };
 
 /// Evaluates every profile at t. Allocates only when `sample` is first used.
 void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample);
 
-/// CommandSample::engaged alone.
+/// CommandSample::engaged alone, and CommandSample::carried.
 void EvaluateSwitches(const Motion& motion, double t_s, std::vector<double>* engaged);
+void EvaluatePayloads(const Motion& motion, double t_s, std::vector<double>* carried);
+/// True if some body's mass changes.
+[[nodiscard]] bool HasPayloads(const Motion& motion);
 
 /// Motion of everything driven at one instant: the drives in model order, then the prescribed
 /// joints in model order.
@@ -250,6 +256,11 @@ struct BodyStates {
   std::vector<double> engaged = {};
   [[nodiscard]] double Engaged(size_t element) const {
     return element < engaged.size() ? engaged[element] : 1.0;
+  }
+  /// The same of its mass and inertia per body.
+  std::vector<double> carried = {};
+  [[nodiscard]] double Carried(size_t body) const {
+    return body < carried.size() ? carried[body] : 1.0;
   }
 
   void Resize(size_t bodies);

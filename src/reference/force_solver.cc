@@ -523,6 +523,7 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
     const Vec3 force = body.mass * (x.a_cm - mechanism.gravity_W);
     const Vec3 moment_cm = x.I * x.e + x.w.cross(x.I * x.w);
     (*wrench_W)[b] << moment_cm + x.c.cross(force), force;
+    (*wrench_W)[b] *= states.Carried(b);
   }
   for (const LoadSample& load : loads) {
     const LoadInWorld f = InWorld(mechanism, states, load);
@@ -548,7 +549,7 @@ MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R
     const Mat6 M =
         SpatialInertia(body.mass, R_WB * body.p_BoBcm_B, R_WB * body.I_Bcm_B * R_WB.transpose());
     const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
-    MR.middleRows<6>(at) = M * R.middleRows<6>(at);
+    MR.middleRows<6>(at) = states.Carried(b) * M * R.middleRows<6>(at);
   }
   ForRotorInertias(mechanism, states, [&](size_t b, size_t c, const Mat6& block) {
     const auto row = 6 * (static_cast<Eigen::Index>(b) - 1);
@@ -564,8 +565,9 @@ Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
     const Body& body = mechanism.bodies[b];
     const Inertial x = InertialOf(body, states.X_WB[b], states.V_WB[b], states.A_WB[b]);
     const Vec3 p_Wcm = states.X_WB[b].translation() + x.c;
-    energy.kinetic += 0.5 * (body.mass * x.v_cm.squaredNorm() + x.w.dot(x.I * x.w));
-    energy.gravity -= body.mass * mechanism.gravity_W.dot(p_Wcm);
+    const double share = states.Carried(b);
+    energy.kinetic += 0.5 * share * (body.mass * x.v_cm.squaredNorm() + x.w.dot(x.I * x.w));
+    energy.gravity -= share * body.mass * mechanism.gravity_W.dot(p_Wcm);
   }
   for (const SpringDamper& spring : mechanism.springs) {
     const double stretch = LengthRow(spring, mechanism, states).value - spring.free_length_m;
@@ -582,8 +584,10 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
     const Body& body = mechanism.bodies[b];
     const Inertial x = InertialOf(body, states.X_WB[b], states.V_WB[b], states.A_WB[b]);
     // d/dt ½ ω·Iω = ω·Iε, since ω·(ω × Iω) = 0.
-    power.energy_rate += body.mass * x.v_cm.dot(x.a_cm - mechanism.gravity_W) + x.w.dot(x.I * x.e);
-    power.gravity += body.mass * x.v_cm.dot(mechanism.gravity_W);
+    const double share = states.Carried(b);
+    power.energy_rate +=
+        share * (body.mass * x.v_cm.dot(x.a_cm - mechanism.gravity_W) + x.w.dot(x.I * x.e));
+    power.gravity += share * body.mass * x.v_cm.dot(mechanism.gravity_W);
   }
   for (const LoadSample& load : loads) {
     const LoadInWorld f = InWorld(mechanism, states, load);

@@ -39,6 +39,7 @@ RunSummary ReferenceSolver::Kinematics(const CommandSample& command, ReferenceSa
 RunSummary ReferenceSolver::Dynamics(const CommandSample& command, ReferenceSample* sample) {
   if (RunSummary summary = Kinematics(command, sample); !summary.ok()) return summary;
   sample->states.engaged = command.engaged;
+  sample->states.carried = command.carried;
   RunSummary summary = impl_->forces.Solve(command.loads, sample, &impl_->closure);
   if (!summary.ok()) {
     summary.time_s = command.time_s;

@@ -426,6 +426,11 @@ class MotionReader {
     }
     if (map.valid() && node != nullptr && IsFree(node, forces)) {
       ReadFreeMotion(values_, mechanism_, *node, forces, &tables_, &motion_);
+      if (HasPayloads(motion_)) {
+        yaml().Error(*sections.switches,
+                     "switches: the mass of a body changes in commanded motions only",
+                     "where forces move what grips it, that is an impact, which is not computed");
+      }
     } else if (map.valid() && motion_.commands.empty() && !yaml().has_errors() && node != nullptr) {
       yaml().Error(*node, "motion commands nothing",
                    "give commands, equal, path or pose_table; or forces and initial values");
@@ -753,13 +758,38 @@ class MotionReader {
                        "dry friction and curves of the rate are");
           return;
         }
-        motion_.switches.push_back({entry.key, e, share});
+        motion_.switches.push_back({.name = entry.key, .element = e, .share = share});
       }
       if (motion_.switches.size() > before) continue;
-      yaml().Error(entry,
-                   fmt::format("switches: {} has no element '{}'", mechanism_.name, entry.key),
-                   DidYouMean(entry.key, names, "known: " + Joined(names, kMostNames)));
+      if (const int body = mechanism_.FindBody(entry.key); body > 0) {
+        if (!CheckPayload(entry, path, body)) return;
+        motion_.switches.push_back({.name = entry.key, .body = body, .share = share});
+        continue;
+      }
+      yaml().Error(
+          entry,
+          fmt::format("switches: {} has no element and no body '{}'", mechanism_.name, entry.key),
+          DidYouMean(entry.key, names, "known: " + Joined(names, kMostNames)));
     }
+  }
+
+  // A body that another one carries may have a share of its mass.
+  bool CheckPayload(const YamlEntry& entry, const std::string& path, int body) {
+    const bool carried = std::ranges::any_of(mechanism_.joints, [&](const Joint& joint) {
+      return joint.kind == JointKind::kFixed && (joint.child == body || joint.parent == body);
+    });
+    if (!carried) {
+      yaml().Error(
+          entry,
+          fmt::format("{}: the mass of a body changes only where another body carries it", path),
+          "a payload is a body of its own, on a fixed joint");
+      return false;
+    }
+    if (mechanism_.bodies[static_cast<size_t>(body)].gravity_compensation != 0.0) {
+      yaml().Error(entry, path + ": a body with gravity compensation is no payload");
+      return false;
+    }
+    return true;
   }
 
   // A share below zero would push: looked at where profiles begin, end and turn, and between.

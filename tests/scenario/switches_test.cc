@@ -54,7 +54,8 @@ TEST_F(SwitchesTest, ForcesJumpWhereTheyAreStated) {
 
 TEST_F(SwitchesTest, WhatMeansNothingIsAFinding) {
   const std::string free = "forces: {motor: 0}\n";
-  Says(free + "switches: {clutch: 1}\n", "has no element 'clutch'");
+  Says(free + "switches: {clutch: 1}\n", "has no element and no body 'clutch'");
+  Says(free + "switches: {drum: 1}\n", "only where another body carries it");
   Says(free + "switches: {buffer: 1}\n", "is not switched");
   Says(free + "switches: {brake: [1, {step: {at_s: 1, height: -2}}]}\n", "violates share >= 0");
   Says("forces: {motor: {step: {height: 1}}}\n", "at_s");

@@ -6,6 +6,7 @@
 #include "simulation/mjcf/plan.h"
 #include "tests/mechanisms/friction_pendulum.h"
 #include "tests/mechanisms/pushed_block.h"
+#include "tests/reference/fixture.h"
 #include "tests/simulation/torque_error.h"
 
 namespace mbv {
@@ -227,6 +228,74 @@ TEST(SimulatedElements, ARotorOnAFreeDistanceDriveIsRefused) {
   EXPECT_EQ(run.summary.where, "J");
   EXPECT_NE(run.summary.message.find("no inertia along a tendon"), std::string::npos)
       << run.summary.message;
+}
+
+// An arm that grips a parcel at its tip and lets it go again:
+//   τ = (J + s J_p) q̈ + g cos q (m r + s m_p r_p), s the parcel's share
+struct Gripper {
+  static constexpr double kMass = 0.5, kArm = 0.45, kInertia = 0.003;
+  double mass = kMass;
+
+  [[nodiscard]] Mechanism Make() const {
+    Mechanism m = fixtures::MakePivotedBar();
+    m.bodies.push_back(
+        fixtures::MakeBody("parcel", mass, Vec3(0.05, 0, 0), Vec3(0.001, 0.002, kInertia)));
+    m.joints.push_back(
+        fixtures::MakeJoint("grip", JointKind::kFixed, 1, Vec3(0.4, 0, 0), 2, Vec3::Zero()));
+    m.tree_joints.push_back(1);
+    m.tree_reversed.push_back(false);
+    m.X_WB_home = TreePoses(m, {m.joints[0].guess, m.joints[1].guess});
+    return m;
+  }
+  [[nodiscard]] double Torque(double t, double q, double a) const {
+    const double s = t >= 0.5 && t < 1.25 ? 1.0 : 0.0;
+    return (0.072 + s * (kInertia + mass * kArm * kArm)) * a +
+           9.81 * std::cos(q) * (1.3 * 0.2 + s * mass * kArm);
+  }
+  [[nodiscard]] double Error(const Trace& trace) const {
+    double error = 0.0;
+    for (Eigen::Index i = 0; i < trace.values.rows(); ++i) {
+      const double t = trace.time_s[static_cast<size_t>(i)];
+      const double truth = Torque(t, fixtures::At(trace, i, "motor.position"),
+                                  fixtures::At(trace, i, "motor.acceleration"));
+      error = std::max(error, std::abs(fixtures::At(trace, i, "motor.force") - truth));
+    }
+    return error;
+  }
+};
+
+TEST(Payloads, AreCarriedWhileTheyAreStated) {
+  const Gripper gripper;
+  const Mechanism m = gripper.Make();
+  Motion motion = fixtures::DriveMotion(m, {{{SineTerm{0.8, 0.5, 0}}}}, 2.0, 0.02);
+  motion.switches = {
+      {.name = "parcel",
+       .body = 2,
+       .share = {{JumpTerm{.at_s = 0.5, .delta = 1.0}, JumpTerm{.at_s = 1.25, .delta = -1.0}}}}};
+  const Profile profile = motion.commands[0].profile;
+  const auto driven = [&](double t, DrivenSample* at) {
+    const Jet jet = Evaluate(profile, t);
+    at->position = VecX::Constant(1, jet.value);
+    at->velocity = VecX::Constant(1, jet.rate);
+    at->acceleration = VecX::Constant(1, jet.acceleration);
+    return RunSummary::Done();
+  };
+  const ReferenceRun reference = RunReference(m, motion);
+  ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
+  EXPECT_LT(gripper.Error(reference.trace), 1e-12);
+  EXPECT_GT(Gripper{.mass = Gripper::kMass * (1.0 + 1e-6)}.Error(reference.trace), 1e-7);
+  for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
+    const bool forward = mode == DriveMode::kPrescribedMotion;
+    const SimulationRun run = Simulate(m, motion, driven, {.mode = mode});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    EXPECT_LT(gripper.Error(run.trace), forward ? 1e-7 : 1e-12);
+    EXPECT_GT(Gripper{.mass = Gripper::kMass * (1.0 + 1e-5)}.Error(run.trace), 1e-6);
+    for (const char* channel : {"energy.kinetic", "energy.gravity", "grip.reaction.fy"}) {
+      const VecX off =
+          fixtures::ColumnOf(run.trace, channel) - fixtures::ColumnOf(reference.trace, channel);
+      EXPECT_LT(off.cwiseAbs().maxCoeff(), forward ? 1e-7 : 1e-12) << channel;
+    }
+  }
 }
 
 }  // namespace

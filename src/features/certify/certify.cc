@@ -985,6 +985,7 @@ class Prover {
   // Loads, springs and elements; gravity's compensation that drives exert.
   std::string Apply(const Start& start) {
     engaged_ = start.command.engaged;
+    if (!start.command.carried.empty()) return "not provable: the mass of a body changes";
     for (const LoadSample& load : start.command.loads) {
       const auto b = static_cast<size_t>(load.body);
       exact::Vector<T> f = exact::Lifted<T>(load.force), m = exact::Lifted<T>(load.moment);

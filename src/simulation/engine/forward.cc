@@ -640,6 +640,7 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     const DrivenSample& at = samples[n];
     targets = at.position;
     if (rates) TargetsWithRates(at, tc, &targets);
+    s->SetPayloads(static_cast<double>(n) * h);
     s->system.SetTargets(targets);
     if (s->system.has_given_forces() || s->lacking || s->loads.follow()) {
       s->system.EvaluatePosition();

@@ -200,6 +200,7 @@ void Integrator::Evaluate(const VecX& q, const VecX& v, const Commanded& at, dou
   std::copy(q.begin(), q.end(), d_->qpos);
   std::copy(v.begin(), v.end(), d_->qvel);
   d_->time = t_s;
+  s_.SetPayloads(t_s);
   s_.system.SetTargets(at.motion.position);
   s_.system.EvaluatePosition();
   mj_crb(m_, d_);

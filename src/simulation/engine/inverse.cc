@@ -67,6 +67,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
   VecX tau(s->engine.m->nv), closed;
   const LoopClock clock;
   for (size_t i = 0; i < times.size(); ++i) {
+    s->SetPayloads(times[i]);
     closed = Eigen::Map<const VecX>(d->qpos, s->engine.m->nq);
     if (i > 0) predictor.Predict(times[i] - times[i - 1], d);
     if (RunSummary summary =

@@ -27,6 +27,10 @@ class RowSurveyor {
   RowSurveyor(Session* session, RowSurvey* survey) : s_(*session), survey_(*survey) {}
 
   RunSummary Run(const DrivenMotion& driven, const std::vector<double>& times_s) {
+    if (HasPayloads(s_.motion)) {
+      return {.stop = Stop::kUnsupported,
+              .message = "the mass of a body changes: rows are compared for one model"};
+    }
     VecX from = HomePositions(s_.engine);
     for (const double t_s : times_s) {
       DrivenSample at;

@@ -135,6 +135,8 @@ struct Session {
   /// Loads, and what is switched, at t.
   void EvaluateLoads(double t_s);
   void ApplyForces(double t_s, const Commanded& at);
+  /// Masses at t into the model; before MuJoCo evaluates positions.
+  void SetPayloads(double t_s);
 
   const EngineModel engine;
   const DataHandle data;
@@ -155,8 +157,17 @@ struct Session {
   const bool lacking;     ///< there are force elements that MuJoCo has no word for
   const bool gyroscopic;  ///< some of them need accelerations
   VecX work_rates;        ///< of the state that was asked for last
-  EngineState start;      ///< of a mechanism whose drives are force-controlled or servos
-  bool shared = false;    ///< drive forces are not unique: the least ones are reported
+  /// A body whose mass changes, in MuJoCo's model, with all of its mass.
+  struct Payload {
+    int id = 0;
+    size_t body = 0;
+    double mass = 0.0;
+    Vec3 inertia = Vec3::Zero();
+  };
+  std::vector<Payload> payloads;
+  std::vector<double> carried;  ///< BodyStates::carried
+  EngineState start;            ///< of a mechanism whose drives are force-controlled or servos
+  bool shared = false;          ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
   VecX given;             ///< forces that the driven coordinates are given
   bool diverged = false;  ///< the run ended because numbers or loops did not hold

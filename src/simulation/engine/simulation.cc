@@ -58,6 +58,15 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       loaded(LoadedElements(*engine.mechanism)),
       lacking(HasLacking(*engine.mechanism)),
       gyroscopic(HasGyroscopic(*engine.mechanism)) {
+  for (size_t i = 1; i < engine.plan.bodies.size(); ++i) {
+    const int body = engine.plan.bodies[i].body, id = engine.body_id[i];
+    if (std::ranges::none_of(motion.switches, [&](const Switch& of) { return of.body == body; }))
+      continue;
+    payloads.push_back({.id = id,
+                        .body = static_cast<size_t>(body),
+                        .mass = engine.m->body_mass[id],
+                        .inertia = Eigen::Map<const Vec3>(engine.m->body_inertia + 3 * id)});
+  }
   run->trace.witness = role::kSimulated.name;
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
@@ -156,6 +165,20 @@ VecX HomePositions(const EngineModel& engine) {
 void Session::EvaluateLoads(double t_s) {
   loads.Evaluate(t_s, *data);
   system.SetEngaged(motion, t_s);
+}
+
+void Session::SetPayloads(double t_s) {
+  if (payloads.empty()) return;
+  EvaluatePayloads(motion, until(t_s), &carried);
+  mjModel* m = engine.m.get();
+  for (const Payload& payload : payloads) {
+    m->body_mass[payload.id] = carried[payload.body] * payload.mass;
+    Eigen::Map<Vec3>{m->body_inertia + 3 * payload.id} = carried[payload.body] * payload.inertia;
+  }
+  std::copy_n(m->body_mass, m->nbody, m->body_subtreemass);
+  for (int b = m->nbody - 1; b > 0; --b) {
+    m->body_subtreemass[m->body_parentid[b]] += m->body_subtreemass[b];
+  }
 }
 
 void Session::ApplyForces(double t_s, const Commanded& at) {
