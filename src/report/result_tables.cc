@@ -134,7 +134,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string Spaced(const std::vector<std::string>& words) {
+std::string ByBlanks(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
   return text;
@@ -236,7 +236,7 @@ std::string RedundancyText(const MobilityReport& report) {
   }
   for (const LoopCount& loop : report.loops) {
     text +=
-        fmt::format("  loop {}: {}, screws of rank {}{}\n", Spaced(loop.joints),
+        fmt::format("  loop {}: {}, screws of rank {}{}\n", ByBlanks(loop.joints),
                     Count(loop.joint_dofs, "joint degree of freedom", "joint degrees of freedom"),
                     loop.screw_rank, loop.screw_rank == 3 ? " (planar or spherical)" : "");
   }
@@ -283,7 +283,7 @@ std::string ForcesText(const Mechanism& mechanism, const MobilityReport& report)
   text += fmt::format("  joint reactions: {} of {} joints not determined by statics alone\n",
                       report.home.reactions_not_unique.size(), mechanism.joints.size());
   for (const UndeterminedReaction& reaction : report.home.reactions_not_unique) {
-    text += fmt::format("    {}: {}\n", reaction.joint, Spaced(reaction.components));
+    text += fmt::format("    {}: {}\n", reaction.joint, ByBlanks(reaction.components));
   }
   text += "  because\n";
   for (const StressGroup& group : report.undetermined) text += ReasonText(group);

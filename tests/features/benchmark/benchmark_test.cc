@@ -75,18 +75,64 @@ TEST_F(BenchmarkTest, ConfirmsPublishedMotion) {
   EXPECT_EQ(ran, 2u);
 }
 
-// The first body's mass is off by 2 %. Four tables are too coarse for that
-// (docs/how-to/benchmark_cases.md); the others of this kind notice it.
-TEST_F(BenchmarkTest, AWrongMassIsContradicted) {
+// What is off by 2 % where the first body's mass does not matter: nothing falls, or all does alike.
+struct Perturbed {
+  const char *name, *file, *from, *to;
+};
+constexpr Perturbed kPerturbed[] = {
+    {"ball_rest", "model.yaml", "com: [0, 0, 0]", "com: [0.0001, 0, 0]"},
+    {"cut_force_load", "run.yaml", "[500, 0, 0]", "[510, 0, 0]"},
+    {"cut_force_torque_load", "run.yaml", "[450, -250, 0]", "[450, -255, 0]"},
+    {"cut_torque_load", "run.yaml", "[500, 0, 0]", "[510, 0, 0]"},
+    {"cylindrical_rest", "model.yaml", "axis: z", "axis: [0, 0.02, 1]"},
+    {"damped_slides_trapezoid", "model.yaml", "damping: 310", "damping: 316.2"},
+    {"engine_gas_stroke", "run.yaml", "1e5*area", "1.02e5*area"},
+    {"engine_v6", "run.yaml", "1e5*area", "1.02e5*area"},
+    {"engine_v6_cad", "run.yaml", "1e5*area", "1.02e5*area"},
+    {"free_fall", "model.yaml", "-9.80665", "-9.81"},
+    {"gear_carrier", "model.yaml", "ratio: -10", "ratio: -10.2"},
+    {"gear_constraint", "model.yaml", "ratio: 10", "ratio: 10.2"},
+    {"gear_ramp", "model.yaml", "ratio: 5", "ratio: 5.1"},
+    {"joint_rrp", "model.yaml", "end: [1.0, 0.3, 0]", "end: [1.02, 0.3, 0]"},
+    {"joint_rrr", "model.yaml", "end: [1.0, 0.3, 0]", "end: [1.02, 0.3, 0]"},
+    {"joint_ssr", "model.yaml", "end: [1.0, 0.3, 0]", "end: [1.02, 0.3, 0]"},
+    {"joint_usp", "model.yaml", "end: [1.0, 0.3, 0]", "end: [1.02, 0.3, 0]"},
+    {"joint_usr", "model.yaml", "end: [1.0, 0.3, 0]", "end: [1.02, 0.3, 0]"},
+    {"planar_rest", "model.yaml", "z: [0, 1, 0]", "z: [0, 1, 0.02]"},
+    {"point_mass", "model.yaml", "com: [1.0", "com: [1.02"},
+    {"revolute_rest", "model.yaml", "com: [0, 0, 0]", "com: [0.0001, 0, 0]"},
+    {"rod_on_slide", "model.yaml", "1.04^2", "1.05^2"},
+    {"rotor_drive", "model.yaml", "[2.0, 1.5", "[2.04, 1.5"},
+    {"rotor_moving", "model.yaml", "[2.0, 1.5", "[2.04, 1.5"},
+    {"rotor_moving_2", "model.yaml", "[2.0, 1.5", "[2.04, 1.5"},
+    {"rotor_torque", "model.yaml", "[2.0, 1.5", "[2.04, 1.5"},
+    {"rotors_sprung", "run.yaml", "free: 1.7453", "free: 1.7802"},
+    {"shafts_damper", "run.yaml", "\"2*0.6*", "\"2*0.612*"},
+    {"slide_fall", "model.yaml", "-9.80665", "-9.81"},
+};
+
+// The first body's mass is off by 2 %, or what matters instead. Four tables are too coarse for that
+// (docs/how-to/benchmark_cases.md); the others of this kind notice it. Cases that only have
+// further tables of another case's motion are left out.
+TEST_F(BenchmarkTest, AnErrorOfTwoPercentIsContradicted) {
   const std::vector<std::string> coarse = {"fourbar_ssr", "fourbar_usr", "universal_pendulum",
                                            "universal_torque"};
   Diagnostics diagnostics;
-  size_t tried = 0;
+  size_t tried = 0, elsewhere = 0;
   for (const BenchmarkCase& one :
        ReadBenchmarkCases({SourcePath("/scenarios/benchmark")}, &diagnostics)) {
-    if (one.suite != "modelica" || one.scenario.empty()) continue;
+    if (one.suite != "modelica" || one.scenario.empty() || !one.published_is_wrong.empty() ||
+        !fs::exists(fs::path(one.file).parent_path() / "run.yaml")) {
+      continue;
+    }
     Copy(one.name);
-    Replace("model.yaml", "\n    mass: ", "\n    mass: 1.02*");
+    Perturbed perturbed = {"", "model.yaml", "\n    mass: ", "\n    mass: 1.02*"};
+    const auto* other = std::ranges::find(kPerturbed, one.name, &Perturbed::name);
+    if (other != std::end(kPerturbed)) {
+      perturbed = *other;
+      ++elsewhere;
+    }
+    Replace(perturbed.file, perturbed.from, perturbed.to);
     const BenchmarkResult result = Run();
     const bool is_coarse = std::ranges::find(coarse, one.name) != coarse.end();
     EXPECT_EQ(result.verdict, is_coarse ? CaseVerdict::kConfirmed : CaseVerdict::kContradicted)
@@ -94,7 +140,18 @@ TEST_F(BenchmarkTest, AWrongMassIsContradicted) {
     EXPECT_EQ(AsStated(Read(), result), is_coarse) << one.name;
     ++tried;
   }
-  EXPECT_GT(tried, 50u);
+  EXPECT_GT(tried, 100u);
+  EXPECT_EQ(elsewhere, std::size(kPerturbed));
+}
+
+// ω of a body that tumbles, in its own axes; another axis, and a trace without rates.
+TEST_F(BenchmarkTest, AngularVelocitiesAreInTheOutputsAxes) {
+  Copy("spherical_constraint");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kConfirmed);
+  Replace("case.yaml", "end.omega.y", "end.omega.z");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kContradicted);
+  Replace("case.yaml", "end.omega.z", "end.omega.w");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kNotRun);
 }
 
 #ifdef MBV_ODE
@@ -298,7 +355,7 @@ TEST(BenchmarkCases, ShippedOnesAreSoundAndHaveTheirSource) {
   Diagnostics diagnostics;
   const auto cases = ReadBenchmarkCases({SourcePath("/scenarios/benchmark")}, &diagnostics);
   EXPECT_TRUE(diagnostics.findings().empty()) << diagnostics.Text();
-  EXPECT_GE(cases.size(), 60u);
+  EXPECT_GE(cases.size(), 180u);
   size_t series = 0;
   for (const BenchmarkCase& one : cases) {
     series += one.published.size();
@@ -306,7 +363,7 @@ TEST(BenchmarkCases, ShippedOnesAreSoundAndHaveTheirSource) {
         << "folders are named as cases";
     EXPECT_FALSE(one.source.url.empty()) << one.file;
   }
-  EXPECT_GE(series, 250u);
+  EXPECT_GE(series, 900u);
 }
 
 TEST(BenchmarkCommand, WritesTheSameErrorsTwiceAndFindsCasesByName) {
