@@ -263,10 +263,10 @@ TEST(Mjcf, WhatMuJoCoHasNoWordForIsListedAndInTheComment) {
   options.friction = true;
   EXPECT_TRUE(MissingInMjcf(m, options).empty());
   m.bodies[2].gravity_compensation = 0.5;
-  m.elements = {{.name = "rub", .joint = 1, .law = FrictionLaw{.coulomb = 1.0, .breakaway = 2.0}}};
+  m.elements = {{.name = "bearing", .joint = 1, .law = FrictionLaw{.coulomb = 1.0, .breakaway = 2.0}}};
   const std::vector<std::string> missing = MissingInMjcf(m, options);
   ASSERT_EQ(missing.size(), 2u);
-  EXPECT_TRUE(missing[0].starts_with("rub: ")) << missing[0];
+  EXPECT_TRUE(missing[0].starts_with("bearing: ")) << missing[0];
   EXPECT_TRUE(missing[1].starts_with(m.bodies[2].name + ": ")) << missing[1];
   for (const std::string& line : missing) {
     EXPECT_NE(WriteMjcf(m, options).find(line), std::string::npos) << line;
