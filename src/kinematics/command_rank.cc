@@ -217,7 +217,9 @@ std::vector<size_t> StuckDrives(const Mechanism& mechanism) {
 }
 
 CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
-                                   const std::vector<Coordinate>& candidates, size_t preferred) {
+                                   const std::vector<Coordinate>& candidates, size_t preferred,
+                                   size_t makeshift) {
+  constexpr double kOfMakeshift = 0.1;
   // Share of a gradient that others do not hold. Forces of what is chosen grow by its inverse.
   constexpr double kWell = 1e-2, kIndependent = 1e-5;
   // What is chosen is taken out of those that are left.
@@ -242,10 +244,14 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
     });
   }
   std::ranges::sort(choice.chosen);
+  const auto others =
+      gradients.rows() - static_cast<Eigen::Index>(std::min(makeshift, candidates.size()));
   while (choice.left() > 0 && gradients.rows() > 0) {
     Eigen::Index best = 0;
-    const double most = gradients.rowwise().norm().maxCoeff(&best);
-    if (most <= kIndependent) break;
+    VecX moves = gradients.rowwise().norm();
+    moves = (moves.array() > kIndependent).select(moves, 0.0);
+    moves.tail(others) *= kOfMakeshift;
+    if (moves.maxCoeff(&best) == 0.0) break;
     take(best);
   }
   return choice;

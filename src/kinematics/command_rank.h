@@ -43,10 +43,11 @@ struct CoordinateChoice {
 
 /// Takes the first `preferred` candidates in their order, as far as they are independent at home
 /// (first those of which the others hold less than 99 %), then of the rest what moves most while
-/// those before are held.
+/// those before are held. Candidates from `makeshift` on have to move ten times more than others.
 [[nodiscard]] CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                                  const std::vector<Coordinate>& candidates,
-                                                 size_t preferred);
+                                                 size_t preferred,
+                                                 size_t makeshift = static_cast<size_t>(-1));
 
 /// A set of coordinates by name that holds each DOF once: the prescribed joints that are not
 /// chosen, which are held, and the others.

@@ -420,7 +420,9 @@ RunSummary ClosureSolver::CheckHere() {
   if (gap_position_m_ > kOpen * length_ + rounding || gap_rotation_rad_ > kOpen) {
     RunSummary summary = Failed(
         Stop::kNoConvergence,
-        "a constraint that was redundant at the home pose is violated: the loops close there only");
+        "a constraint that depends on others at the home pose is violated: either the loops close "
+        "there only (rounded lengths or axes), or home is a singular pose from which they go on in "
+        "another way (guesses beside it choose one)");
     summary.where = OwnerOf(worst);
     summary.amount = rows_.value[worst];
     summary.unit = rows_.angular[worst] ? "rad" : "m";

@@ -168,7 +168,59 @@ void AddShape(const Shape& shape, const Pose& X_WB, std::vector<Item>* items) {
   items->push_back(item);
 }
 
-// A body without shapes: a rod between two touching points, a star and a rim for more.
+// The outline of points in a plane with this normal, anticlockwise about it.
+std::vector<Vec3> OutlineOf(std::vector<Vec3> points, const Vec3& x, const Vec3& y,
+                            const Vec3& normal) {
+  // Lower and upper hull [Andrew 1979].
+  std::ranges::sort(points, {}, [&](const Vec3& p) { return std::pair(x.dot(p), y.dot(p)); });
+  std::vector<Vec3> hull;
+  for (int side = 0; side < 2; ++side, std::ranges::reverse(points)) {
+    const std::size_t first = hull.size();
+    for (const Vec3& p : points) {
+      while (hull.size() >= first + 2) {
+        const Vec3 &a = hull[hull.size() - 2], &b = hull.back();
+        if ((b - a).cross(p - b).dot(normal) > 0.0) break;
+        hull.pop_back();
+      }
+      hull.push_back(p);
+    }
+    hull.pop_back();
+  }
+  return hull;
+}
+
+// A plate through points that lie in a plane and in no line; null for others.
+std::shared_ptr<const TriangleMesh> PlateThrough(const std::vector<Vec3>& points,
+                                                 double thickness) {
+  constexpr double kFlat = 0.05, kWide = 0.05;  // of the largest extent
+  if (points.size() < 3) return nullptr;
+  Vec3 centre = Vec3::Zero();
+  for (const Vec3& p : points) centre += p / static_cast<double>(points.size());
+  Mat3 spread = Mat3::Zero();
+  for (const Vec3& p : points) spread += (p - centre) * (p - centre).transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
+  const Vec3 extent = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  if (extent[0] > kFlat * extent[2] || extent[1] < kWide * extent[2]) return nullptr;
+  const Vec3 normal = axes.eigenvectors().col(0), x = axes.eigenvectors().col(2);
+  const std::vector<Vec3> outline = OutlineOf(points, x, normal.cross(x), normal);
+  auto plate = std::make_shared<TriangleMesh>();
+  const auto n = static_cast<int>(outline.size());
+  for (const double side : {-0.5, 0.5}) {
+    for (const Vec3& p : outline) plate->vertices.push_back(p + side * thickness * normal);
+  }
+  for (int k = 0; k < n; ++k) {
+    const int next = (k + 1) % n;
+    plate->triangles.push_back({k, next, next + n});
+    plate->triangles.push_back({k, next + n, k + n});
+    if (k == 0 || next == 0) continue;
+    plate->triangles.push_back({0, next, k});
+    plate->triangles.push_back({n, n + k, n + next});
+  }
+  return plate;
+}
+
+// A body without shapes: a rod between two touching points; for more a plate where they lie in a
+// plane, else a star.
 void AddDefaultShape(const Mechanism& mechanism, int body, const Pose& X_WB, const Scale& scale,
                      std::vector<Item>* items) {
   std::vector<Vec3> points = TouchPoints(mechanism, body);
@@ -186,6 +238,11 @@ void AddDefaultShape(const Mechanism& mechanism, int body, const Pose& X_WB, con
   if (points.size() == 2) {
     items->push_back(
         Between(Solid::kCapsule, X_WB * points[0], X_WB * points[1], radius, material));
+    return;
+  }
+  if (const auto& plate = scale.plates[static_cast<std::size_t>(body)]) {
+    items->push_back(
+        MeshItem({.X_BG = Pose::Identity(), .file = {}, .surface = plate}, X_WB, material));
     return;
   }
   Vec3 centre = Vec3::Zero();
@@ -352,6 +409,11 @@ Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frame
   scale.joint_m = 0.0075 * scale.extent_m;
   scale.leg_m = 0.0085 * scale.extent_m;
   scale.arrow_m = 0.18 * scale.extent_m;
+  scale.plates.resize(mechanism.bodies.size());
+  for (std::size_t b = 1; b < mechanism.bodies.size(); ++b) {
+    if (!mechanism.bodies[b].shapes.empty()) continue;
+    scale.plates[b] = PlateThrough(TouchPoints(mechanism, static_cast<int>(b)), 0.8 * scale.leg_m);
+  }
   scale.barrel_m.assign(mechanism.drives.size(), 0.0);
   for (std::size_t d = 0; d < mechanism.drives.size(); ++d) {
     const bool linear = ForceUnit(mechanism, mechanism.drives[d]) == "N";

@@ -76,6 +76,8 @@ struct Scale {
   double arrow_m = 0.2;   ///< length of the longest force arrow
   double longest_force_N = 0.0, longest_torque_Nm = 0.0;  ///< over all frames
   std::vector<double> barrel_m;  ///< per drive: length of the distance drive's barrel
+  /// Per body: the plate that stands for it where it has no shapes; null for others.
+  std::vector<std::shared_ptr<const TriangleMesh>> plates;
 };
 [[nodiscard]] Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frames);
 

@@ -520,12 +520,13 @@ class MotionReader {
 
   // What to command where the name is that of a joint, or of a ball's rotation.
   [[nodiscard]] std::optional<std::string> JointHint(const std::string& name) const {
-    for (const NamedCoordinate& named : NamedJointCoordinates(mechanism_)) {
-      if (named.name != name) continue;
+    const int j = mechanism_.FindJoint(name);
+    const auto is_named = [&](const NamedCoordinate& named) { return named.name == name; };
+    if (std::ranges::any_of(NamedJointCoordinates(mechanism_), is_named) ||
+        (j >= 0 && mechanism_.joints[static_cast<size_t>(j)].kind == JointKind::kSpherical)) {
       return "a rotation of a spherical joint has no axis that a command could be about: command "
              "OUTPUT.roll, OUTPUT.pitch or OUTPUT.yaw of an output on its body";
     }
-    const int j = mechanism_.FindJoint(name);
     if (j < 0) return {};
     std::vector<std::string> own;
     for (const NamedCoordinate& named : known_) {

@@ -255,7 +255,9 @@ MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives) {
     options.kv = std::move(servos.kv);
     options.motor_home = std::move(servos.force);
   }
-  return {.text = WriteMjcf(mechanism, options), .trouble = {}};
+  return {.text = WriteMjcf(mechanism, options),
+          .trouble = {},
+          .missing = MissingInMjcf(mechanism, options)};
 }
 
 }  // namespace mbv

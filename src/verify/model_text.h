@@ -40,8 +40,9 @@ struct HomeServos {
 enum class ModelDrives { kFree, kHeld, kServo };
 
 struct MjcfText {
-  std::string text = {};  ///< "" when there is trouble
-  std::string trouble;    ///< why there is no such text
+  std::string text = {};                  ///< "" when there is trouble
+  std::string trouble;                    ///< why there is no such text
+  std::vector<std::string> missing = {};  ///< what acts on forces and MuJoCo has no word for
 };
 [[nodiscard]] MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives);
 

@@ -108,6 +108,31 @@ TEST(CommandRank, WhatHardlyDiffersFromOthersIsTakenWhereNothingBetterIsPreferre
   EXPECT_EQ(chosen({0, 0, 3}).chosen, (std::vector<size_t>{0, 2}));
 }
 
+TEST(CommandRank, AMakeshiftIsChosenWhereItMovesTenTimesMore) {
+  for (const auto& [ratio, chosen] : {std::pair(8.0, 0u), {12.0, 1u}}) {
+    Mechanism m;
+    m.bodies = {{.name = "world", .frames = {}, .shapes = {}},
+                {.name = "slow", .mass = 1.0, .frames = {}, .shapes = {}},
+                {.name = "fast", .mass = 1.0, .frames = {}, .shapes = {}}};
+    for (const int child : {1, 2}) {
+      Joint joint;
+      joint.kind = JointKind::kRevolute;
+      joint.child = child;
+      m.joints.push_back(joint);
+    }
+    m.X_WB_home.assign(3, Pose::Identity());
+    m.tree_joints = {0, 1};
+    m.tree_reversed = {false, false};
+    m.couplings = {{.name = "gear",
+                    .terms = {{.joint = 0, .coordinate = 0, .polynomial = {ratio}},
+                              {.joint = 1, .coordinate = 0, .polynomial = {-1.0}}}}};
+    const std::vector<Coordinate> both = {{Coordinate::Kind::kJoint, 0, 0},
+                                          {Coordinate::Kind::kJoint, 1, 0}};
+    EXPECT_EQ(ChooseCoordinates(m, both, 0, 1).chosen, std::vector<size_t>{chosen}) << ratio;
+    EXPECT_EQ(ChooseCoordinates(m, both, 0).chosen, std::vector<size_t>{1}) << ratio;
+  }
+}
+
 TEST(Mobility, TwoMotorsOnOneDofFightEachOther) {
   Mechanism m = MakeFourBar();
   m.drives.push_back({.name = "second", .kind = JointDrive{2, 0}, .range = {}});

@@ -60,6 +60,23 @@ TEST(UrdfConventions, RpyIsYawAfterPitchAfterRollAndTheAxisIsInTheJointFrame) {
   EXPECT_FALSE(std::isfinite(joint.range[0].upper));
 }
 
+TEST(UrdfConventions, AnUndefinedParentWorldIsTheWorld) {
+  const auto robot = [](const std::string& parent) {
+    return "<robot name=\"r\"><link name=\"a\"/><joint name=\"weld\" type=\"fixed\"><parent "
+           "link=\"" +
+           parent + "\"/><child link=\"a\"/><origin xyz=\"1 2 3\"/></joint></robot>";
+  };
+  Diagnostics diagnostics;
+  const UrdfTree tree = ReadUrdf(robot("world"), "r.urdf", &diagnostics);
+  EXPECT_EQ(diagnostics.Text(),
+            "r.urdf: warning: the parent link 'world' of joint 'weld' is not in the file: taken as "
+            "the world\n");
+  ASSERT_EQ(tree.joints.size(), 1u);
+  EXPECT_EQ(tree.joints[0].parent, -1);
+  EXPECT_EQ(tree.joints[0].X_PF.translation(), Vec3(1, 2, 3));
+  EXPECT_NE(Findings(robot("floor")).find("error"), std::string::npos);
+}
+
 TEST(UrdfConventions, TheDefaultAxisIsX) {
   const UrdfTree tree = MustRead(
       Robot("<link name=\"a\"/><joint name=\"j\" type=\"continuous\"><parent link=\"world\"/>"

@@ -107,6 +107,34 @@ TEST(MechanismItems, MakeALegTelescopeBetweenItsEnds) {
   EXPECT_NEAR(b[0] + b[2], 1.3, kRoundoff);
 }
 
+// A body without shapes through whose points no rod goes.
+TEST(MechanismItems, ShowABodyBetweenPointsInAPlaneAsAPlate) {
+  const std::vector<Vec3> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.4, 0.5, 0}};
+  const auto plate = [&](const Vec3& off, double width) {
+    Mechanism m;
+    m.bodies = {{.name = "world", .frames = {}, .shapes = {}},
+                {.name = "table", .mass = 1.0, .frames = {}, .shapes = {}}};
+    for (const Vec3& p : square) {
+      Joint joint;
+      joint.kind = JointKind::kSpherical;
+      joint.child = 1;
+      joint.X_PF = joint.X_CM = Pose(Eigen::Translation3d(p.cwiseProduct(Vec3(1, width, 1)) +
+                                                          (p.x() == 0.4 ? off : Vec3::Zero())));
+      m.joints.push_back(joint);
+    }
+    m.X_WB_home.assign(2, Pose::Identity());
+    const Scale scale = ScaleOf(m, {HomeFrame(m)});
+    const std::vector<Item> items = MechanismItems(m, HomeFrame(m), scale, PictureOptions{});
+    const auto found = std::ranges::find(items, Solid::kMesh, &Item::solid);
+    return found == items.end() ? std::pair(0.0, scale)
+                                : std::pair(PropertiesOf(*found->mesh).volume, scale);
+  };
+  const auto [volume, scale] = plate(Vec3::Zero(), 1.0);
+  EXPECT_NEAR(volume, 0.8 * scale.leg_m, 64 * kEps);  // its area times its thickness
+  EXPECT_EQ(plate(Vec3(0, 0, 0.5), 1.0).first, 0.0);  // not in a plane
+  EXPECT_EQ(plate(Vec3::Zero(), 0.01).first, 0.0);    // next to a line
+}
+
 TEST(Annotate, GivesArrowsWhoseLengthFollowsTheForce) {
   const Mechanism mechanism = test::BallOnLeg();
   PictureFrame frame = HomeFrame(mechanism);

@@ -631,6 +631,43 @@ TEST(ForeignMjcf, LimitsOfActuatorsAreMotors) {
   }
 }
 
+// A fixed tendon whose joints follow one of them drives this one, by Σ c_i r_i of its gear.
+TEST(ForeignMjcf, AnActuatorOfCoupledJointsDrivesTheOneThatTheyFollow) {
+  const auto fingers = [](const std::string& coefficients, const std::string& equality) {
+    return ReadText(
+        "<mujoco><worldbody><body><joint name='A' axis='0 0 1'/><inertial pos='0 0 0' mass='1' "
+        "diaginertia='1 1 1'/></body><body><joint name='B' axis='0 0 1'/><inertial pos='0 0 0' "
+        "mass='1' diaginertia='1 1 1'/></body></worldbody><tendon><fixed name='both'>" +
+        coefficients + "</fixed></tendon><equality>" + equality +
+        "</equality><actuator><motor name='grip' tendon='both' gear='4' forcerange='-2 2'/>"
+        "</actuator></mujoco>");
+  };
+  const std::string both = "<joint joint='A' coef='0.5'/><joint joint='B' coef='0.25'/>";
+  const std::string follows = "<joint joint1='A' joint2='B' polycoef='0.1 -2 0 0 0'/>";
+  for (const auto& [coefficients, equality, drive, gear] :
+       {std::tuple(both, follows, "B", 3.0),
+        {"<joint joint='A' coef='0.5'/>", "", "A", 2.0},
+        {both, "", "", 0.0},
+        {both, "<joint joint1='A' joint2='B' polycoef='0 -2 1 0 0'/>", "", 0.0},
+        {both, "<joint joint1='A' joint2='B' polycoef='0 -0.5 0 0 0'/>", "", 0.0},
+        {both, "<joint joint1='A' joint2='B' polycoef='0 -2 0 0 0' active='false'/>", "", 0.0},
+        {both, follows + "<joint joint1='B' joint2='A' polycoef='0 1 0 0 0'/>", "", 0.0}}) {
+    const Read read = fingers(coefficients, equality);
+    ASSERT_TRUE(read.model) << read.diagnostics.Text();
+    const Mechanism& m = read.model->mechanism;
+    const std::string what = std::string(coefficients) + std::string(equality);
+    ASSERT_EQ(m.drives.size(), *drive == '\0' ? 0u : 1u) << what;
+    EXPECT_EQ(read.model->left_out.size(), 1u - m.drives.size()) << what;
+    if (m.drives.empty()) continue;
+    const auto* on = std::get_if<JointDrive>(&m.drives[0].kind);
+    ASSERT_NE(on, nullptr);
+    EXPECT_EQ(m.joints[static_cast<size_t>(on->joint)].name, drive) << what;
+    ASSERT_EQ(m.motors.size(), 1u);
+    EXPECT_EQ(m.motors[0].gear_ratio, gear) << what;
+    EXPECT_EQ(m.motors[0].peak, 2.0) << what;
+  }
+}
+
 // A side on which the actuators push less, or not at all, keeps it; a gear below 0 turns sides
 // round.
 TEST(ForeignMjcf, LimitsOfOneSideAreThatSides) {

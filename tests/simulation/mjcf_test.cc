@@ -257,6 +257,22 @@ TEST(Mjcf, TheHeadSaysHowToUseTheFileInEachForm) {
   EXPECT_NE(servo.find("position and a velocity servo"), std::string::npos);
 }
 
+TEST(Mjcf, WhatMuJoCoHasNoWordForIsListedAndInTheComment) {
+  Mechanism m = fixtures::MakeFourBar();
+  MjcfOptions options;
+  options.friction = true;
+  EXPECT_TRUE(MissingInMjcf(m, options).empty());
+  m.bodies[2].gravity_compensation = 0.5;
+  m.elements = {{.name = "bearing", .joint = 1, .law = FrictionLaw{.coulomb = 1.0, .breakaway = 2.0}}};
+  const std::vector<std::string> missing = MissingInMjcf(m, options);
+  ASSERT_EQ(missing.size(), 2u);
+  EXPECT_TRUE(missing[0].starts_with("bearing: ")) << missing[0];
+  EXPECT_TRUE(missing[1].starts_with(m.bodies[2].name + ": ")) << missing[1];
+  for (const std::string& line : missing) {
+    EXPECT_NE(WriteMjcf(m, options).find(line), std::string::npos) << line;
+  }
+}
+
 TEST(Mjcf, StaticsModelsSayThatTheyAreNotForStepping) {
   const Mechanism m = fixtures::MakeFourBar();
   const std::string statics = WriteMjcf(m, {.statics = true});

@@ -227,6 +227,67 @@ std::string Rods(int digits, double spoilt = 0.0) {
 
 // Rounded numbers keep overconstrained loops from moving: what the printed digits explain is taken
 // for rounding, and said; no more.
+// A platform on six tendons, a Stewart platform's legs without bodies.
+std::string OnTendons(const std::string& tendon, const std::string& actuators) {
+  std::string sites, on_platform, legs;
+  for (int i = 0; i < 6; ++i) {
+    const double base = std::numbers::pi / 180.0 * (120.0 * (i / 2) + (i % 2 == 0 ? -10.0 : 10.0));
+    const double top = std::numbers::pi / 180.0 * (120.0 * (i / 2) + (i % 2 == 0 ? -50.0 : 50.0));
+    sites += fmt::format("<site name='b{}' pos='{} {} 0'/>", i, 0.6 * std::cos(base),
+                         0.6 * std::sin(base));
+    on_platform += fmt::format("<site name='t{}' pos='{} {} 0'/>", i, 0.3 * std::cos(top),
+                               0.3 * std::sin(top));
+    legs += fmt::format(
+        "<spatial name='leg{0}' {1}><site site='b{0}'/><site site='t{0}'/></spatial>", i, tendon);
+  }
+  return "<mujoco><worldbody>" + sites + "<body name='platform' pos='0 0 0.8'><freejoint/>" +
+         on_platform + "<inertial pos='0 0 0.01' mass='10' diaginertia='0.2 0.2 0.4'/></body>" +
+         "</worldbody><tendon>" + legs + "</tendon><actuator>" + actuators + "</actuator></mujoco>";
+}
+
+TEST(MjcfImport, AFreeBodyOnDrivenOrSpringyTendonsMovesUnlessItIsNamedAsTheBase) {
+  const test::TestFolder folder("mjcf_on_tendons");
+  std::string motors;
+  for (int i = 0; i < 6; ++i) motors += fmt::format("<motor tendon='leg{}'/>", i);
+  const auto kind = [&](const std::string& text, const std::string& base) {
+    const LoadResult loaded = LoadRobot(folder.Write("robot.xml", text), Holding(base));
+    EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    return loaded.mechanism->joints.at(0).kind;
+  };
+  EXPECT_EQ(kind(OnTendons("", motors), ""), JointKind::kFree);
+  EXPECT_EQ(kind(OnTendons("", motors), "platform"), JointKind::kFixed);
+  EXPECT_EQ(kind(OnTendons("stiffness='400'", ""), ""), JointKind::kFree);
+  EXPECT_EQ(kind(OnTendons("", ""), ""), JointKind::kFixed);
+  const SurveyRow row =
+      SurveyFile(folder.Write("robot.xml", OnTendons("", motors)), folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  EXPECT_EQ(row.dofs, 6);
+  EXPECT_TRUE(row.caveats.empty());
+}
+
+// Of what floats all coordinates move by forces, and the drives still go all the way.
+TEST(MjcfImport, DrivesOfAFloatingRobotGoAsFarAsOfAHeldOne) {
+  const test::TestFolder folder("mjcf_floating");
+  const std::string file = folder.Write(
+      "robot.xml",
+      "<mujoco><worldbody><body name='trunk' pos='0 0 1'><freejoint/><inertial pos='0 0 0' "
+      "mass='5' "
+      "diaginertia='0.1 0.2 0.3'/><body name='leg' pos='0 0.1 0'><joint name='j' axis='0 1 0'/>"
+      "<inertial pos='0.2 0 0' mass='1' diaginertia='0.01 0.01 0.01'/></body></body></worldbody>"
+      "<actuator><motor joint='j'/></actuator></mujoco>");
+  LoadOptions floating;
+  floating.free_base = true;
+  const auto stroke = [&](const LoadOptions& options, size_t notes) {
+    const DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml", options);
+    EXPECT_TRUE(made.setup) << made.diagnostics.Text();
+    EXPECT_EQ(made.setup->notes.size(), notes);
+    return FindFirstMotion(made.setup->mechanism, {}).strokes.at(0).height;
+  };
+  const double held = stroke({}, 0);
+  EXPECT_GT(held, 0.1);
+  EXPECT_EQ(stroke(floating, 1), held);
+}
+
 TEST(MjcfImport, LoopsThatOnlyPrintedDigitsKeepFromMovingMove) {
   const test::TestFolder folder("mjcf_rounded");
   for (const int digits : {4, 6, 8}) {
@@ -714,6 +775,46 @@ TEST(MjcfImport, MeshesHaveTheMassOfTheirVolume) {
   EXPECT_NEAR(body.mass, 1000.0 * 7.0 / 3.0, 1e-7 * body.mass);
   EXPECT_NEAR(body.p_BoBcm_B.z(), 11.0 / 28.0, 1e-7);
   EXPECT_LT(body.p_BoBcm_B.head<2>().norm(), 1e-7);
+}
+
+// A trough of 3 m³, as MuJoCo 3.14 compiles it by its default (inertia="legacy").
+TEST(MjcfImport, MeshesThatAreNotConvexWeighWhatMuJoCo3Computes) {
+  const test::TestFolder folder("mjcf_trough");
+  const LoadResult loaded = LoadText(folder, R"(<mujoco><asset><mesh name="m"
+vertex="0 0 0 3 0 0 3 0 2 2.5 0 2 2.5 0 0.5 0.5 0 0.5 0.5 0 2 0 0 2 0 1 0 3 1 0 3 1 2 2.5 1 2 2.5 1 0.5 0.5 1 0.5 0.5 1 2 0 1 2"
+face="0 1 4 8 12 9 0 4 5 8 13 12 1 2 3 9 11 10 1 3 4 9 12 11 0 5 6 8 14 13 0 6 7 8 15 14 0 9 1 0 8 9 1 10 2 1 9 10 2 11 3 2 10 11 3 12 4 3 11 12 4 13 5 4 12 13 5 14 6 5 13 14 6 15 7 6 14 15 7 8 0 7 15 8"/>
+</asset><worldbody><body name="b"><joint name="a" axis="0 1 0"/>
+<geom type="mesh" mesh="m" density="1" contype="0" conaffinity="0"/></body></worldbody></mujoco>)");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Body& body = loaded.mechanism->bodies[loaded.mechanism->FindBody("b")];
+  EXPECT_NEAR(body.mass, 5.507533037138299, 1e-6);
+  EXPECT_LT((body.p_BoBcm_B - Vec3(1.5, 0.5, 0.8806497778537252)).norm(), 1e-6);
+}
+
+// The class of a geom may state its mesh, its type and its density; a geom may have another mesh.
+TEST(MjcfImport, MeshesOfClassesCountAsTheGeomsOwn) {
+  const test::TestFolder folder("mjcf_class_mesh");
+  const auto box = [](const char* name, double x) {
+    return fmt::format(
+        "<mesh name='{0}' vertex='0 0 0  {1} 0 0  0 1 0  {1} 1 0  0 0 1  {1} 0 1  0 1 1  {1} 1 "
+        "1'/>",
+        name, x);
+  };
+  // Without classes, by a class, and with another one than that of the class, which is nowhere.
+  for (const auto& [of_class, own] : {std::pair("", "type='mesh' mesh='tip' density='300'"),
+                                      {"type='mesh' mesh='tip' density='300'", ""},
+                                      {"type='mesh' mesh='none' density='300'", "mesh='tip'"}}) {
+    const LoadResult loaded = LoadText(
+        folder, fmt::format("<mujoco><default><default class='seen'><geom contype='0' "
+                            "conaffinity='0' {}/></default></default><asset>{}{}</asset>"
+                            "<worldbody><body name='b'><joint name='a' axis='0 1 0'/><geom "
+                            "class='seen' {}/></body></worldbody></mujoco>",
+                            of_class, box("tip", 2.0), box("other", 1.0), own));
+    ASSERT_TRUE(loaded.mechanism) << of_class << loaded.diagnostics.Text();
+    const Body& body = loaded.mechanism->bodies[loaded.mechanism->FindBody("b")];
+    EXPECT_NEAR(body.mass, 600.0, 1e-4) << of_class;
+    EXPECT_LT((body.p_BoBcm_B - Vec3(1, 0.5, 0.5)).norm(), 1e-6) << of_class;
+  }
 }
 
 // A wrist on three rods, whose balls at the cranks have forces. The spins are held by the balls at

@@ -610,7 +610,7 @@ class Auditor {
     if (request_.prepared->scenario.simulation.ignore_ranges) {
       audit_.done.emplace_back("limits of joints are off: home is beyond one");
     }
-    say(facts.unused_actuators, "actuators that drive nothing here are off");
+    say(facts.unused_actuators, "actuators that act through tendons or drive nothing here are off");
     say(facts.left_out, "the file has what the reference does not");
   }
 

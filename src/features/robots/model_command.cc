@@ -100,6 +100,9 @@ int Model(const ModelArguments& arguments) {
       const std::string of = arguments.drives.empty() ? "" : "--drives " + arguments.drives + ": ";
       return Refuse(of + mjcf.trouble, "");
     }
+    for (const std::string& line : mjcf.missing) {
+      Say(stderr, "warning: not in the MJCF, as MuJoCo 2.2 has no word for it: {}\n", line);
+    }
     text = std::move(mjcf.text);
   } else {
     text = ModelText(*loaded.mechanism, format, loaded.caveats);

@@ -33,25 +33,35 @@ bool IsContact(const Mechanism& m, size_t joint) {
   });
 }
 
-// The drives' coordinates, then all others that can be driven.
-std::vector<Coordinate> Candidates(const Mechanism& m) {
-  std::vector<Coordinate> candidates;
+struct Candidates {
+  std::vector<Coordinate> coordinates;
+  size_t makeshift = 0;  ///< index of the first that the robot has no hinge or slide for
+};
+
+// The drives' coordinates, then all others that can be driven: hinges and slides first.
+Candidates CandidatesOf(const Mechanism& m) {
+  Candidates candidates;
+  std::vector<Coordinate> others;
   for (size_t d = 0; d < m.drives.size(); ++d) {
-    candidates.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
+    candidates.coordinates.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
   }
   for (size_t j = 0; j < m.joints.size(); ++j) {
     // Nothing is there that a drive could act on.
     if (m.joints[j].kind == JointKind::kFree || IsContact(m, j)) continue;
+    const bool usual = DofsOf(m.joints[j].kind) == 1 && !m.joints[j].closure;
     for (int c = 0; c < DofsOf(m.joints[j].kind); ++c) {
       const bool driven = std::any_of(m.drives.begin(), m.drives.end(), [&](const Drive& drive) {
         const auto* on = std::get_if<JointDrive>(&drive.kind);
         return on != nullptr && on->joint == static_cast<int>(j) && on->coordinate == c;
       });
       if (!driven && !IsOfBall(m.joints[j].kind, c)) {
-        candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
+        (usual ? candidates.coordinates : others)
+            .push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
       }
     }
   }
+  candidates.makeshift = candidates.coordinates.size();
+  candidates.coordinates.insert(candidates.coordinates.end(), others.begin(), others.end());
   return candidates;
 }
 
@@ -84,6 +94,24 @@ void HoldAbout(const Vec3& n_W, int ball, Mechanism* m) {
   std::erase_if(m->elements, [ball](const ForceElement& element) {
     return element.joint == ball && element.coordinate == 2;
   });
+}
+
+// A free body that moves in this motion is held where it is; false without one.
+bool HoldFloating(const std::vector<Vec6>& motion, Mechanism* m) {
+  for (Joint& joint : m->joints) {
+    const Vec6 moves = motion[joint.child] - motion[joint.parent];
+    if (joint.kind != JointKind::kFree || moves.norm() < 1e-3) continue;
+    joint.kind = JointKind::kFixed;
+    joint.X_PF = m->X_WB_home[joint.parent].inverse() * m->X_WB_home[joint.child];
+    joint.X_CM = Pose::Identity();
+    joint.guess = joint.home = {};
+    joint.range = {};
+    const auto held = static_cast<int>(&joint - m->joints.data());
+    std::erase_if(m->elements,
+                  [held](const ForceElement& element) { return element.joint == held; });
+    return true;
+  }
+  return false;
 }
 
 // A ball that turns in this motion is held about it; false without one.
@@ -126,7 +154,8 @@ std::vector<ModelCaveat> HoldUnevenSpins(Mechanism* m) {
            .source = "ball"}};
 }
 
-// The mechanism with balls held where no drive holds them: for a look at where the drives lead.
+// The mechanism with balls, or else floating bodies, held where no drive holds them: for a look at
+// where the drives lead.
 Mechanism WithTurnsHeld(const Mechanism& mechanism) {
   Mechanism m = mechanism;
   std::vector<Coordinate> drives;
@@ -135,17 +164,18 @@ Mechanism WithTurnsHeld(const Mechanism& mechanism) {
   }
   for (std::vector<Vec6> free = FreeMotion(m, drives); !free.empty();
        free = FreeMotion(m, drives)) {
-    if (!HoldTurn(free, &m)) break;
+    if (!HoldTurn(free, &m) && !HoldFloating(free, &m)) break;
   }
   return m;
 }
 
-// Rotations of balls that stay when `held` are held, as independent coordinates.
+// Rotations of balls, and coordinates of free bodies, that stay when `held` are held, as
+// independent coordinates.
 std::vector<Coordinate> TurnsLeft(const Mechanism& m, const std::vector<Coordinate>& held) {
   std::vector<Coordinate> candidates = held;
   for (size_t j = 0; j < m.joints.size(); ++j) {
     for (int c = 0; c < DofsOf(m.joints[j].kind); ++c) {
-      if (!IsOfBall(m.joints[j].kind, c)) continue;
+      if (!IsOfBall(m.joints[j].kind, c) && m.joints[j].kind != JointKind::kFree) continue;
       candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
     }
   }
@@ -279,7 +309,7 @@ class MotionSearch {
   }
 
   FirstMotion Run() {
-    const std::vector<DriveStroke> full = motion_.strokes;
+    std::vector<DriveStroke> full = motion_.strokes;
     constexpr int kHalvings = 7;
     // At the smallest motion the bodies are as fast as at home.
     const auto scaled = [&](double scale) {
@@ -289,7 +319,12 @@ class MotionSearch {
     };
     scaled(std::ldexp(1.0, -kHalvings));
     Course at_home;
-    if (!Follow({}, &at_home)) return motion_;
+    if (!Follow({}, &at_home)) {
+      if (!left_range_) return motion_;
+      TurnToWhereRoomIs(std::ldexp(1.0, -kHalvings), &full);
+      scaled(std::ldexp(1.0, -kHalvings));
+      if (!Follow({}, &at_home)) return motion_;
+    }
     const Course limit{.quickest = kMostQuicker * at_home.quickest,
                        .weakest = at_home.weakest / kMostQuicker};
     for (int i = 0; i <= kHalvings; ++i) {
@@ -310,6 +345,26 @@ class MotionSearch {
   struct Course {
     double quickest = std::numeric_limits<double>::infinity(), weakest = 0.0;
   };
+
+  // Each drive alone: the other way where other joints are at the end of their ranges, or not at
+  // all.
+  void TurnToWhereRoomIs(double scale, std::vector<DriveStroke>* full) {
+    for (size_t k = 0; k < full->size(); ++k) {
+      double& height = (*full)[k].height;
+      if (height == 0.0) continue;
+      const auto has_room = [&] {
+        for (DriveStroke& stroke : motion_.strokes) stroke.height = 0.0;
+        motion_.strokes[k].height = scale * height;
+        Course course;
+        return Follow({}, &course) || !left_range_;
+      };
+      if (has_room()) continue;
+      height = -height;
+      if (has_room()) continue;
+      height = 0.0;
+      motion_.without_room.push_back(NameOf(m_, motion_.coordinates[k]));
+    }
+  }
 
   // Small enough for stretched knees; down, where they cannot stretch further.
   DriveStroke StrokeOfBase(const Coordinate& coordinate) const {
@@ -351,7 +406,8 @@ class MotionSearch {
   }
 
   // False where the motion cannot be followed, leaves a range or goes beyond `limit`.
-  bool Follow(const Course& limit, Course* course) const {
+  bool Follow(const Course& limit, Course* course) {
+    left_range_ = false;
     *course = {.quickest = 0.0, .weakest = std::numeric_limits<double>::infinity()};
     const Motion motion = Commands();
     ReferenceSolver solver(m_, motion);
@@ -366,7 +422,8 @@ class MotionSearch {
       if (sample.control < limit.weakest) return false;
       course->quickest = std::max(course->quickest, quick);
       course->weakest = std::min(course->weakest, sample.control);
-      if (!motion_.beyond_ranges && !IsWithinRanges(m_, sample.states.X_WB)) return false;
+      left_range_ = !motion_.beyond_ranges && !IsWithinRanges(m_, sample.states.X_WB);
+      if (left_range_) return false;
     }
     return true;
   }
@@ -374,6 +431,7 @@ class MotionSearch {
   const Mechanism& m_;
   const double length_;
   FirstMotion motion_;
+  bool left_range_ = false;  // why the last motion could not be followed
 };
 
 std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
@@ -436,10 +494,11 @@ Mechanism WithDriveForEachDof(const Mechanism& mechanism, std::vector<std::strin
   Mechanism m = mechanism;
   // Here nothing gives their motion: drives hold them like the others.
   m.prescribed.clear();
-  const std::vector<Coordinate> candidates = Candidates(m);
-  const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
+  const Candidates candidates = CandidatesOf(m);
+  const CoordinateChoice choice =
+      ChooseCoordinates(m, candidates.coordinates, m.drives.size(), candidates.makeshift);
   std::vector<Coordinate> taken;
-  for (const size_t k : choice.chosen) taken.push_back(candidates[k]);
+  for (const size_t k : choice.chosen) taken.push_back(candidates.coordinates[k]);
   by_forces->clear();
   if (choice.left() > 0) *by_forces = TurnsLeft(m, taken);
   if (!by_forces->empty()) notes->push_back(ByForcesNote(m, *by_forces));
@@ -543,6 +602,12 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
             ? "no motion was found that stays away from singular poses: the smallest is taken"
             : "no motion of the drives was found with what moves by forces held: the smallest is "
               "taken");
+  }
+  if (!motion.without_room.empty()) {
+    setup.notes.push_back(fmt::format(
+        "at home other joints that move along are at an end of their ranges: no room for {}, which "
+        "rest{}",
+        Joined(motion.without_room, kMostNames), motion.without_room.size() == 1 ? "s" : ""));
   }
   if (motion.beyond_ranges) {
     setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");

@@ -33,8 +33,9 @@ struct FirstMotion {
   std::vector<Coordinate> coordinates;  ///< that are commanded
   std::vector<DriveStroke> strokes;     ///< of each
   double duration_s = 1.0;
-  bool found = false;          ///< the loops stay closed on it, away from singular poses
-  bool beyond_ranges = false;  ///< home itself is out of range
+  bool found = false;                     ///< the loops stay closed on it, away from singular poses
+  bool beyond_ranges = false;             ///< home itself is out of range
+  std::vector<std::string> without_room;  ///< what rests because other joints' ranges hold it
 };
 /// The largest of a sequence of ever smaller motions on which loops stay closed, joints stay in
 /// their ranges and no body moves much faster against the drives than it does at home. Drives named

@@ -483,6 +483,24 @@ bool NestsDeeperThan(const std::string& xml, int limit) {
   return false;
 }
 
+// The name of a joint on a link 'world' that the file does not define, as Gazebo and Drake allow;
+// empty without one.
+std::string OnImpliedWorld(const tinyxml2::XMLElement& robot) {
+  const auto has = [](const tinyxml2::XMLElement* element, const char* attribute) {
+    return element != nullptr && element->Attribute(attribute, "world") != nullptr;
+  };
+  const tinyxml2::XMLElement* link = robot.FirstChildElement("link");
+  for (; link != nullptr; link = link->NextSiblingElement("link")) {
+    if (has(link, "name")) return "";
+  }
+  const tinyxml2::XMLElement* joint = robot.FirstChildElement("joint");
+  for (; joint != nullptr; joint = joint->NextSiblingElement("joint")) {
+    const char* name = joint->Attribute("name");
+    if (has(joint->FirstChildElement("parent"), "link")) return name == nullptr ? "" : name;
+  }
+  return "";
+}
+
 }  // namespace
 
 int UrdfTree::FindLink(const std::string& link) const {
@@ -515,6 +533,14 @@ UrdfTree ReadUrdf(const std::string& text, const std::string& file, Diagnostics*
   std::string named = text;
   if (top->Attribute("name") == nullptr) {
     named.insert(named.find("<robot") + std::string_view("<robot").size(), " name=\"robot\"");
+  }
+  if (const std::string joint = OnImpliedWorld(*top); !joint.empty()) {
+    named.insert(named.rfind("</robot"), "<link name=\"world\"/>");
+    diagnostics->Add({Severity::kWarning, file, 0, 0,
+                      fmt::format("the parent link 'world' of joint '{}' is not in the file: taken "
+                                  "as the world",
+                                  joint),
+                      ""});
   }
   Diagnostics said;
   urdf::ModelInterfaceSharedPtr model;

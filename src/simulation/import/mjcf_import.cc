@@ -169,9 +169,36 @@ bool IsFree(const mjModel& m, int b) {
   return m.body_jntnum[b] > 0 && m.jnt_type[m.body_jntadr[b]] == mjJNT_FREE;
 }
 
-// Per body, the first root of the trees that closures tie to its own; 0 where they tie it to what
-// does not float.
-std::vector<int> TiedTo(const MjcfImport& in) {
+// The sites of a tendon that is a straight line between two sites on different bodies of MuJoCo.
+std::optional<std::pair<int, int>> LegSites(const mjModel& m, int tendon) {
+  const int first = m.tendon_adr[tendon];
+  if (m.tendon_num[tendon] != 2 || m.wrap_type[first] != mjWRAP_SITE ||
+      m.wrap_type[first + 1] != mjWRAP_SITE) {
+    return std::nullopt;
+  }
+  const int from = m.wrap_objid[first], to = m.wrap_objid[first + 1];
+  if (m.site_bodyid[from] == m.site_bodyid[to]) return std::nullopt;
+  return std::pair(from, to);
+}
+
+// Pairs of bodies that a leg whose length is driven, or a spring, ties together.
+std::vector<std::pair<int, int>> LegTies(const MjcfImport& in) {
+  const mjModel& m = in.m;
+  std::vector<std::pair<int, int>> ties;
+  for (int t = 0; t < m.ntendon; ++t) {
+    bool acts = m.tendon_stiffness[t] != 0.0 && !in.IsOff(mjDSBL_PASSIVE);
+    for (int u = 0; u < m.nu; ++u) {
+      acts = acts || (m.actuator_trntype[u] == mjTRN_TENDON && m.actuator_trnid[2 * u] == t);
+    }
+    const auto sites = LegSites(m, t);
+    if (acts && sites) ties.emplace_back(m.site_bodyid[sites->first], m.site_bodyid[sites->second]);
+  }
+  return ties;
+}
+
+// Per body, the first root of the trees that closures tie to its own, and `more` pairs of bodies;
+// 0 where they tie it to what does not float.
+std::vector<int> TiedTo(const MjcfImport& in, std::vector<std::pair<int, int>> more) {
   const mjModel& m = in.m;
   std::vector<int> group(static_cast<size_t>(m.nbody));
   for (int b = 0; b < m.nbody; ++b) {
@@ -180,9 +207,10 @@ std::vector<int> TiedTo(const MjcfImport& in) {
   }
   for (int e = 0; e < m.neq && !in.EqualitiesAreOff(); ++e) {
     const bool ties = m.eq_type[e] == mjEQ_CONNECT || m.eq_type[e] == mjEQ_WELD;
-    if (!ties || m.eq_active[e] == 0) continue;
-    const int a = group[static_cast<size_t>(m.eq_obj1id[e])];
-    const int b = group[static_cast<size_t>(m.eq_obj2id[e])];
+    if (ties && m.eq_active[e] != 0) more.emplace_back(m.eq_obj1id[e], m.eq_obj2id[e]);
+  }
+  for (const auto& [one, other] : more) {
+    const int a = group[static_cast<size_t>(one)], b = group[static_cast<size_t>(other)];
     std::ranges::replace(group, std::max(a, b), std::min(a, b));
   }
   return group;
@@ -192,7 +220,8 @@ std::vector<int> TiedTo(const MjcfImport& in) {
 
 void ChooseHeld(MjcfImport* in) {
   const mjModel& m = in->m;
-  const std::vector<int> tied_to = TiedTo(*in);
+  // What legs carry may be held all the same, but only on demand.
+  const std::vector<int> closed_to = TiedTo(*in, {}), tied_to = TiedTo(*in, LegTies(*in));
   in->moves.assign(static_cast<size_t>(m.njnt), false);
   int base = -1;  // by option
   if (!in->base.held.empty()) {
@@ -204,7 +233,7 @@ void ChooseHeld(MjcfImport* in) {
     if (base < 0) {
       in->Refuse(fmt::format("base {}: there is no body of this name", in->base.held),
                  DidYouMean(in->base.held, names));
-    } else if (tied_to[static_cast<size_t>(base)] == 0) {
+    } else if (closed_to[static_cast<size_t>(base)] == 0) {
       in->Refuse(fmt::format("base {}: the body does not float, its joints or loops hold it in the "
                              "world",
                              in->base.held),
@@ -215,7 +244,8 @@ void ChooseHeld(MjcfImport* in) {
   for (int j = 0; j < m.njnt; ++j) {
     if (m.jnt_type[j] != mjJNT_FREE) continue;
     const int body = m.jnt_bodyid[j], first = tied_to[static_cast<size_t>(body)];
-    const bool chosen = base >= 0 && tied_to[static_cast<size_t>(base)] == first;
+    const bool chosen =
+        base >= 0 && closed_to[static_cast<size_t>(base)] == closed_to[static_cast<size_t>(body)];
     const int held = chosen ? m.body_rootid[base] : first;
     in->moves[static_cast<size_t>(j)] = body != held || in->base.free;
     // A tree of its own that no loop carries.
@@ -242,17 +272,58 @@ namespace {
 // Of a tendon that is a straight line between two sites on different bodies; empty for others.
 std::optional<DistanceDrive> LegOf(int tendon, const MjcfImport& in) {
   const mjModel& m = in.m;
-  const int first = m.tendon_adr[tendon];
-  if (m.tendon_num[tendon] != 2 || m.wrap_type[first] != mjWRAP_SITE ||
-      m.wrap_type[first + 1] != mjWRAP_SITE) {
-    return std::nullopt;
-  }
-  const int from = m.wrap_objid[first], to = m.wrap_objid[first + 1];
+  const auto sites = LegSites(m, tendon);
+  if (!sites) return std::nullopt;
+  const auto [from, to] = *sites;
   const DistanceDrive leg{.body_from = in.body_of[static_cast<size_t>(m.site_bodyid[from])],
                           .p_from = VecAt(m.site_pos + 3 * from),
                           .body_to = in.body_of[static_cast<size_t>(m.site_bodyid[to])],
                           .p_to = VecAt(m.site_pos + 3 * to)};
   return leg.body_from == leg.body_to ? std::nullopt : std::optional(leg);
+}
+
+// A hinge or slide of MuJoCo, and how much something else moves for one unit of it.
+struct Lever {
+  int joint = -1;  ///< -1: none
+  double ratio = 0.0;
+};
+
+// The joint that a joint follows by equalities, linearly; itself where it follows none.
+Lever LeaderOf(int joint, const MjcfImport& in) {
+  const mjModel& m = in.m;
+  Lever lever{joint, 1.0};
+  for (int step = 0; step < m.njnt && !in.EqualitiesAreOff(); ++step) {
+    int next = -1;
+    for (int e = 0; e < m.neq; ++e) {
+      const mjtNum* a = m.eq_data + mjNEQDATA * e;
+      const bool linear = m.eq_type[e] == mjEQ_JOINT && m.eq_active[e] != 0 &&
+                          m.eq_obj2id[e] >= 0 && a[2] == 0.0 && a[3] == 0.0 && a[4] == 0.0;
+      if (linear && m.eq_obj1id[e] == lever.joint) next = e;
+    }
+    if (next < 0) return lever;
+    lever = {m.eq_obj2id[next], lever.ratio * m.eq_data[mjNEQDATA * next + 1]};
+  }
+  return in.EqualitiesAreOff() ? lever : Lever{};  // they follow each other in a circle
+}
+
+// The hinge or slide on which an actuator acts, by itself or through a fixed tendon of joints that
+// follow one of them; the ratio is without its gear.
+Lever LeverOf(int u, const MjcfImport& in) {
+  const mjModel& m = in.m;
+  const int type = m.actuator_trntype[u], target = m.actuator_trnid[2 * u];
+  if (type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT) {
+    return IsScalar(m, target) ? Lever{target, 1.0} : Lever{};
+  }
+  if (type != mjTRN_TENDON) return {};
+  Lever sum;
+  const int first = m.tendon_adr[target];
+  for (int w = first; w < first + m.tendon_num[target]; ++w) {
+    if (m.wrap_type[w] != mjWRAP_JOINT || !IsScalar(m, m.wrap_objid[w])) return {};
+    const Lever leader = LeaderOf(m.wrap_objid[w], in);
+    if (leader.joint < 0 || (sum.joint >= 0 && sum.joint != leader.joint)) return {};
+    sum = {leader.joint, sum.ratio + m.wrap_prm[w] * leader.ratio};
+  }
+  return sum.ratio == 0.0 ? Lever{} : sum;
 }
 
 void AddDrive(int u, MjcfImport* in) {
@@ -268,10 +339,9 @@ void AddDrive(int u, MjcfImport* in) {
     in->mechanism.drives.push_back(drive);
     return;
   }
-  const int type = m.actuator_trntype[u];
-  const bool on_joint = type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT;
-  const int j = on_joint ? in->joint_of[static_cast<size_t>(m.actuator_trnid[2 * u])] : -1;
-  if (j < 0 || DofsOf(in->mechanism.joints[static_cast<size_t>(j)].kind) != 1) {
+  const int type = m.actuator_trntype[u], joint = LeverOf(u, *in).joint;
+  const int j = joint < 0 ? -1 : in->joint_of[static_cast<size_t>(joint)];
+  if (j < 0) {
     constexpr std::pair<int, const char*> kOthers[] = {{mjTRN_SLIDERCRANK, "slidersite"},
                                                        {mjTRN_TENDON, "tendon"},
                                                        {mjTRN_SITE, "site"},
@@ -280,10 +350,12 @@ void AddDrive(int u, MjcfImport* in) {
     for (const auto& [other, word] : kOthers) {
       if (type == other) attribute = word;
     }
-    in->LeaveOut(on_joint ? "actuator of a ball" : "actuator/general", attribute,
+    in->LeaveOut(std::string(attribute) == "joint" ? "actuator of a ball" : "actuator/general",
+                 attribute,
                  fmt::format("actuator '{}', which does not act on a hinge or slide,", name));
     return;
   }
+  if (tendon >= 0 && m.tendon_limited[tendon] == 0) in->driven_tendons.insert(tendon);
   std::vector<Drive>& drives = in->mechanism.drives;
   const bool second = std::ranges::any_of(drives, [j](const Drive& drive) {
     const auto* on = std::get_if<JointDrive>(&drive.kind);
@@ -305,6 +377,8 @@ void AddDrives(MjcfImport* in) {
 //
 //   F = Σ_u g_u f_u along the joint or tendon, g the gear, f the actuator's force (1) f = k c of a
 //   motor (a gain k, no bias), c its control                                        (2)
+//
+// (of a fixed tendon L = Σ c_i q_i of joints q_i = r_i q, its gear times Σ c_i r_i)
 //
 // f is limited by forcerange, c by ctrlrange, and F by the joint's actuatorfrcrange. A position or
 // velocity servo pushes as its error asks: only forcerange limits it. One actuator is the motor
@@ -349,8 +423,8 @@ Sides LimitOf(const mjModel& m, int u) {
 
 // What moves a drive.
 struct Movers {
-  std::vector<int> actuators;
-  int joint = -1;  ///< MuJoCo's
+  std::vector<std::pair<int, double>> actuators;  ///< each with its gear to the drive
+  int joint = -1;                                 ///< MuJoCo's
 };
 
 Movers MoversOf(const Drive& drive, const MjcfImport& in) {
@@ -362,13 +436,14 @@ Movers MoversOf(const Drive& drive, const MjcfImport& in) {
     if (in.NameOf(mjOBJ_ACTUATOR, u, "actuator") == drive.name) tendon = m.actuator_trnid[2 * u];
   }
   for (int u = 0; u < m.nu; ++u) {
-    const int type = m.actuator_trntype[u], target = m.actuator_trnid[2 * u];
+    const double gear = m.actuator_gear[6 * u];
     if (on == nullptr) {
-      if (type == mjTRN_TENDON && target == tendon) movers.actuators.push_back(u);
-    } else if ((type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT) &&
-               in.joint_of[static_cast<size_t>(target)] == on->joint) {
-      movers.actuators.push_back(u);
-      movers.joint = target;
+      const bool moves = m.actuator_trntype[u] == mjTRN_TENDON && m.actuator_trnid[2 * u] == tendon;
+      if (moves) movers.actuators.emplace_back(u, gear);
+    } else if (const Lever lever = LeverOf(u, in);
+               lever.joint >= 0 && in.joint_of[static_cast<size_t>(lever.joint)] == on->joint) {
+      movers.actuators.emplace_back(u, gear * lever.ratio);
+      movers.joint = lever.joint;
     }
   }
   return movers;
@@ -378,19 +453,18 @@ void AddMotor(size_t d, MjcfImport* in) {
   const mjModel& m = in->m;
   const Drive& drive = in->mechanism.drives[d];
   const Movers movers = MoversOf(drive, *in);
-  const auto gear = [&](int u) { return m.actuator_gear[6 * u]; };
   Sides sides{0.0, 0.0};  // along the drive
-  for (const int u : movers.actuators) {
-    if (gear(u) == 0.0) continue;
-    const Sides of = LimitOf(m, u).Times(gear(u));
+  for (const auto& [u, gear] : movers.actuators) {
+    if (gear == 0.0) continue;
+    const Sides of = LimitOf(m, u).Times(gear);
     sides = {sides.least + of.least, sides.most + of.most};
   }
   if (movers.joint >= 0 && in->JointNumber(movers.joint, mjcf::UserNumber::kForceLimited) != 0.0) {
     sides = sides.Within({in->JointNumber(movers.joint, mjcf::UserNumber::kForceLower),
                           in->JointNumber(movers.joint, mjcf::UserNumber::kForceUpper)});
   }
-  const bool alone = movers.actuators.size() == 1 && gear(movers.actuators[0]) != 0.0;
-  const double n = alone ? std::abs(gear(movers.actuators[0])) : 1.0;
+  const bool alone = movers.actuators.size() == 1 && movers.actuators[0].second != 0.0;
+  const double n = alone ? std::abs(movers.actuators[0].second) : 1.0;
   const bool unlimited = std::isinf(sides.least) && std::isinf(sides.most);
   if (!(sides.least < sides.most) || (unlimited && n == 1.0)) return;
   const auto* on = std::get_if<JointDrive>(&drive.kind);
@@ -769,7 +843,7 @@ void WarnWhatIsLost(MjcfImport* in) {
     in->LeaveOut("body/freejoint", "", "the free joint of " + Joined(in->held, kMost));
   }
   if (!in->carried.empty()) {
-    in->Say(fmt::format("{} free to move: loops carry what the file has on {}",
+    in->Say(fmt::format("{} free to move: loops or tendons carry what the file has on {}",
                         Joined(in->carried, kMost) + (in->carried.size() == 1 ? " is" : " are"),
                         in->carried.size() == 1 ? "a free joint" : "free joints"));
   }

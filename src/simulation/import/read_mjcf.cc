@@ -24,8 +24,9 @@ ModelHandle Compile(mjcf::ForeignMjcf* foreign) {
   return model;
 }
 
-// What MuJoCo 3 takes by default: pyramids from the surface's centre to its faces, all counted as
-// positive; exact where all are seen from there. By mesh [m³].
+// What MuJoCo 3 takes by default: pyramids from a centre to the faces, all counted as positive;
+// exact where all are seen from there. The centre is that of the pyramids from the surface's own
+// centre. By mesh [m³].
 std::map<std::string, double> MeshVolumes(const mjModel& m) {
   std::map<std::string, double> volumes;
   for (int mesh = 0; mesh < m.nmesh; ++mesh) {
@@ -35,18 +36,26 @@ std::map<std::string, double> MeshVolumes(const mjModel& m) {
       return Vec3(
           Eigen::Map<const Eigen::Vector3f>(vertices + 3 * faces[3 * face + k]).cast<double>());
     };
+    const int count = m.mesh_facenum[mesh];
     Vec3 centre = Vec3::Zero();
     double area = 0.0, volume = 0.0;
-    for (int f = 0; f < m.mesh_facenum[mesh]; ++f) {
+    for (int f = 0; f < count; ++f) {
       const Vec3 a = corner(f, 0), b = corner(f, 1), c = corner(f, 2);
       const double of_face = 0.5 * (b - a).cross(c - a).norm();
       area += of_face;
       centre += of_face * (a + b + c) / 3.0;
     }
     if (area > 0.0) centre /= area;
-    for (int f = 0; f < m.mesh_facenum[mesh]; ++f) {
-      const Vec3 a = corner(f, 0) - centre, b = corner(f, 1) - centre, c = corner(f, 2) - centre;
-      volume += std::abs(a.cross(b).dot(c)) / 6.0;
+    for (const bool last : {false, true}) {
+      Vec3 moment = Vec3::Zero();
+      volume = 0.0;
+      for (int f = 0; f < count; ++f) {
+        const Vec3 a = corner(f, 0) - centre, b = corner(f, 1) - centre, c = corner(f, 2) - centre;
+        const double of_face = std::abs(a.cross(b).dot(c)) / 6.0;
+        volume += of_face;
+        moment += of_face * (a + b + c) / 4.0;
+      }
+      if (!last && volume > 0.0) centre += moment / volume;
     }
     if (const char* name = mj_id2name(&m, mjOBJ_MESH, mesh)) volumes.emplace(name, volume);
   }

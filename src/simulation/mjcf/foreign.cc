@@ -837,7 +837,7 @@ bool ForeignMjcf::StateMeshMasses(const std::map<std::string, double>& volumes) 
     const bool solid = shell == nullptr || std::string_view(shell) != "true";
     const auto volume = volumes.find(e->Attribute("mesh"));
     if (volume == volumes.end() || mjcf::Inherited(e, "mass") != nullptr || !solid ||
-        (type != nullptr && std::string_view(type) != "mesh")) {
+        type == nullptr || std::string_view(type) != "mesh") {
       return;
     }
     const char* density = mjcf::Inherited(e, "density");

@@ -429,20 +429,15 @@ class MeshTaker {
       : folder_(folder), is_open_(is_open), document_(*document) {}
 
   MeshGeoms Run() {
-    std::vector<XMLElement*> geoms;
-    ForEach(root(), [&](XMLElement* e) {
-      const auto* body = e->Parent()->ToElement();
-      const bool in_body = body != nullptr && (IsTag(body, "body") || IsTag(body, "worldbody"));
-      if (in_body && IsTag(e, "geom") && e->Attribute("mesh") != nullptr) geoms.push_back(e);
-    });
+    const std::vector<XMLElement*> geoms = WithMeshesStated();
     const std::map<std::string, ForeignMesh> assets = MeshAssets();
     for (XMLElement* geom : geoms) {
-      const char* type = geom->Attribute("type");
+      const char* type = Inherited(geom, "type");
       const XMLElement* body = geom->Parent()->ToElement();
       const bool states_inertia = IsTag(body, "worldbody") || StatesInertia(body);
       const auto asset = assets.find(geom->Attribute("mesh"));
       // Others are primitives that are fitted to a mesh.
-      const bool shown = type == nullptr || std::string_view(type) == "mesh";
+      const bool shown = type != nullptr && std::string_view(type) == "mesh";
       if (shown && asset != assets.end()) {
         PutSphere(geom, asset->second);
       } else if (states_inertia) {
@@ -463,6 +458,24 @@ class MeshTaker {
   [[nodiscard]] const char* OfCompiler(const char* attribute) {
     const XMLElement* compiler = root()->FirstChildElement("compiler");
     return compiler == nullptr ? nullptr : compiler->Attribute(attribute);
+  }
+
+  // The geoms of bodies that have a mesh, each with its name; classes then have none, which what
+  // stands for a geom would inherit.
+  std::vector<XMLElement*> WithMeshesStated() {
+    std::vector<XMLElement*> geoms, defaults;
+    ForEach(root(), [&](XMLElement* e) {
+      const auto* parent = e->Parent()->ToElement();
+      if (!IsTag(e, "geom") || parent == nullptr) return;
+      if (IsTag(parent, "default")) defaults.push_back(e);
+      if (!IsTag(parent, "body") && !IsTag(parent, "worldbody")) return;
+      const char* mesh = Inherited(e, "mesh");
+      if (mesh == nullptr) return;
+      e->SetAttribute("mesh", std::string(mesh).c_str());
+      geoms.push_back(e);
+    });
+    for (XMLElement* e : defaults) e->DeleteAttribute("mesh");
+    return geoms;
   }
 
   // <inertial> counts unless the compiler takes geoms instead.
@@ -518,8 +531,8 @@ class MeshTaker {
     sphere->SetAttribute("type", "sphere");
     sphere->SetAttribute("size", "1");
     sphere->SetAttribute("mass", "0");
-    const std::string rgba = MaterialColor(geom->Attribute("material"));
-    if (!rgba.empty() && geom->Attribute("rgba") == nullptr) {
+    const std::string rgba = MaterialColor(Inherited(geom, "material"));
+    if (!rgba.empty() && Inherited(geom, "rgba") == nullptr) {
       sphere->SetAttribute("rgba", rgba.c_str());
     }
     geom->Parent()->InsertAfterChild(geom, sphere);

@@ -345,19 +345,8 @@ const char* DrivesText(const MjcfOptions& options) {
 // Force elements that MuJoCo has no word for.
 std::string LackingText(const Mechanism& mechanism, const MjcfOptions& options) {
   std::string names;
-  for (const ForceElement& element : mechanism.elements) {
-    const bool of_free =
-        element.joint >= 0 && mechanism.joints[element.joint].kind == JointKind::kFree;
-    if (IsPlanned(element) && (!of_free || mjcf::HasEqualForces(mechanism, element.joint)))
-      continue;
-    if (options.friction && mjcf::IsPlainFriction(mechanism, element)) continue;
-    names += fmt::format("   {}: {}\n", InComment(element.name),
-                         InComment(Described(mechanism, element)));
-  }
-  for (const Body& body : mechanism.bodies) {
-    if (body.gravity_compensation == 0.0) continue;
-    names += fmt::format("   {}: a force carries {} of its weight (gravcomp since MuJoCo 3)\n",
-                         InComment(body.name), NumberText(body.gravity_compensation));
+  for (const std::string& line : MissingInMjcf(mechanism, options)) {
+    names += "   " + InComment(line) + "\n";
   }
   if (names.empty()) return "";
   return "Not in this file, as MuJoCo 2.2 has no word for them; qfrc_applied can stand for "
@@ -386,6 +375,24 @@ std::string HeadComment(const Mechanism& mechanism, const MjcfOptions& options) 
 }
 
 }  // namespace mjcf
+
+std::vector<std::string> MissingInMjcf(const Mechanism& mechanism, const MjcfOptions& options) {
+  std::vector<std::string> lines;
+  for (const ForceElement& element : mechanism.elements) {
+    const bool of_free =
+        element.joint >= 0 && mechanism.joints[element.joint].kind == JointKind::kFree;
+    if (mjcf::IsPlanned(element) && (!of_free || mjcf::HasEqualForces(mechanism, element.joint)))
+      continue;
+    if (options.friction && mjcf::IsPlainFriction(mechanism, element)) continue;
+    lines.push_back(fmt::format("{}: {}", element.name, Described(mechanism, element)));
+  }
+  for (const Body& body : mechanism.bodies) {
+    if (body.gravity_compensation == 0.0) continue;
+    lines.push_back(fmt::format("{}: a force carries {} of its weight (gravcomp since MuJoCo 3)",
+                                body.name, mjcf::NumberText(body.gravity_compensation)));
+  }
+  return lines;
+}
 
 std::string WithKeys(const std::string& mjcf, const std::vector<MjcfKey>& keys) {
   const size_t end = mjcf.find("    </keyframe>");

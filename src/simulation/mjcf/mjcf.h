@@ -45,6 +45,10 @@ struct MjcfOptions {
 /// number reads back as the same double. Loads in MuJoCo 2.2.2 and later.
 [[nodiscard]] std::string WriteMjcf(const Mechanism& mechanism, const MjcfOptions& options = {});
 
+/// What acts on forces and is not in that text, a line each: the comment has them, too.
+[[nodiscard]] std::vector<std::string> MissingInMjcf(const Mechanism& mechanism,
+                                                     const MjcfOptions& options);
+
 /// The text that WriteMjcf() wrote with more keyframes behind "home".
 [[nodiscard]] std::string WithKeys(const std::string& mjcf, const std::vector<MjcfKey>& keys);
 

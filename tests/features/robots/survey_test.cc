@@ -278,6 +278,35 @@ TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   EXPECT_NE(notes[0].find("left out: n"), std::string::npos) << notes[0];
 }
 
+// A gripper whose fingers mimic each other, beside an arm; the first finger is between 0 and 0.06.
+TEST(DefaultSetup, DrivesTurnToWhereTheRangesOfWhatFollowsLeaveRoomOrRest) {
+  const test::TestFolder folder("gripper");
+  for (const auto& [lower, upper, height] :
+       {std::tuple(-0.06, 0.06, 1), {-0.06, 0.0, 1}, {0.0, 0.06, 0}}) {
+    const std::string inertial =
+        "<inertial><origin xyz='0.1 0 0'/><mass value='1'/><inertia ixx='0.01' iyy='0.01' "
+        "izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial></link>";
+    const std::string file = folder.Write(
+        "gripper.urdf",
+        "<robot name='gripper'><link name='base'/><link name='arm'>" + inertial +
+            "<link name='left'>" + inertial + "<link name='right'>" + inertial +
+            "<joint name='turn' type='continuous'><parent link='base'/><child link='arm'/><axis "
+            "xyz='0 1 0'/></joint><joint name='l' type='prismatic'><parent link='arm'/><child "
+            "link='left'/><axis xyz='0 1 0'/><limit lower='0' upper='0.06' effort='1' "
+            "velocity='1'/></joint><joint name='r' type='prismatic'><parent link='arm'/><child "
+            "link='right'/><axis xyz='0 1 0'/>" +
+            fmt::format("<limit lower='{}' upper='{}' effort='1' velocity='1'/>", lower, upper) +
+            "<mimic joint='l' multiplier='-1'/></joint></robot>");
+    const DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
+    ASSERT_TRUE(made.setup) << made.diagnostics.Text();
+    const FirstMotion motion = FindFirstMotion(made.setup->mechanism, {});
+    EXPECT_TRUE(motion.found);
+    EXPECT_EQ(motion.without_room.size(), height == 0 ? 1u : 0u) << lower;
+    EXPECT_EQ(std::ranges::count(motion.strokes, 0.0, &DriveStroke::height), height == 0 ? 1 : 0);
+    EXPECT_EQ(SurveyFile(file, folder.PathOf("scratch")).status, "ok") << lower;
+  }
+}
+
 // Whatever balls connect keeps its DOFs; those that no drive can hold move by forces.
 TEST(DefaultSetup, BallsStayBalls) {
   const auto rod = [](const char* com, const char* inertia, const char* more) {
