@@ -263,6 +263,11 @@ TEST(MjcfImport, AFreeBodyOnDrivenOrSpringyTendonsMovesUnlessItIsNamedAsTheBase)
   EXPECT_EQ(row.status, "ok") << row.message;
   EXPECT_EQ(row.dofs, 6);
   EXPECT_TRUE(row.caveats.empty());
+  // On springs it swings, and its pose is what is compared.
+  const SurveyRow swinging =
+      SurveyFile(folder.Write("robot.xml", OnTendons("stiffness='400' damping='9'", "")),
+                 folder.PathOf("scratch"));
+  EXPECT_EQ(swinging.status, "ok") << swinging.message;
 }
 
 // Of what floats all coordinates move by forces, and the drives still go all the way.

@@ -213,12 +213,13 @@ std::string ByForcesNote(const Mechanism& m, const std::vector<Coordinate>& turn
   return text;
 }
 
-// Without outputs nothing shows how balls turn. Idle spins stay idle without one.
+// Without outputs nothing shows how balls turn and free bodies move. Idle spins stay idle without
+// one.
 void AddOutputs(Mechanism* m) {
   if (!m->outputs.empty()) return;
   std::vector<bool> shown(m->bodies.size(), false);
   for (const Joint& joint : m->joints) {
-    if (joint.kind != JointKind::kSpherical) continue;
+    if (!HasBall(joint.kind)) continue;
     for (const int b : {joint.parent, joint.child}) shown[static_cast<size_t>(b)] = b != 0;
   }
   for (const Spin& spin : IdleSpins(*m)) {
