@@ -53,6 +53,9 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
       note(witness.name + ": " + what, why.c_str());
     }
   }
+  if (HasPayloads(*input.motion)) {
+    note(RowOf(Metric::kEnergy).key, "a body whose mass changes brings energy and takes it along");
+  }
   for (const WitnessMetrics& witness : comparison->witnesses) {
     if (witness.derivatives_gap.empty()) continue;
     note(witness.witness + ".derivatives", witness.derivatives_gap.c_str());

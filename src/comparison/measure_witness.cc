@@ -722,7 +722,10 @@ WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) 
   if (input.motion->free()) MeasureStart(input, trace, &metrics);
   const bool engine = IsEngine(trace.witness);
   const LimitColumn column = engine ? input.simulation_limits : LimitColumn::kReference;
-  metrics.energy = AuditEnergy(input, trace, input.limits[Metric::kEnergy].Of(column));
+  // What a payload brings along and takes away is no drive's work.
+  if (!HasPayloads(*input.motion)) {
+    metrics.energy = AuditEnergy(input, trace, input.limits[Metric::kEnergy].Of(column));
+  }
   // Work from samples has their error; only integrated work is judged.
   if (metrics.energy && metrics.energy->integrated) {
     metrics.metrics[Metric::kEnergy] = metrics.energy->drift;
