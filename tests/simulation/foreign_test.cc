@@ -183,8 +183,8 @@ std::map<std::string, Sample> Samples() {
   }
   const std::string on_joint = actuator("<motor name='m' joint='A'/>");
   samples["actuator/* tendon"] = {
-      Arm({.tail = fmt::format(fmt::runtime(fixed), "") +
-                   "<actuator><motor name='m' tendon='t'/></actuator>"}),
+      Arm({.tail = "<tendon><fixed name='t'><joint joint='A' coef='1'/><joint joint='B' coef='1'/>"
+                   "</fixed></tendon><actuator><motor name='m' tendon='t'/></actuator>"}),
       on_joint};
   for (const char* attribute : {"site", "refsite"}) {
     samples["actuator/* " + std::string(attribute)] = {

@@ -263,7 +263,8 @@ TEST(Mjcf, WhatMuJoCoHasNoWordForIsListedAndInTheComment) {
   options.friction = true;
   EXPECT_TRUE(MissingInMjcf(m, options).empty());
   m.bodies[2].gravity_compensation = 0.5;
-  m.elements = {{.name = "bearing", .joint = 1, .law = FrictionLaw{.coulomb = 1.0, .breakaway = 2.0}}};
+  m.elements = {
+      {.name = "bearing", .joint = 1, .law = FrictionLaw{.coulomb = 1.0, .breakaway = 2.0}}};
   const std::vector<std::string> missing = MissingInMjcf(m, options);
   ASSERT_EQ(missing.size(), 2u);
   EXPECT_TRUE(missing[0].starts_with("bearing: ")) << missing[0];

@@ -985,7 +985,9 @@ class Prover {
   // Loads, springs and elements; gravity's compensation that drives exert.
   std::string Apply(const Start& start) {
     engaged_ = start.command.engaged;
-    if (!start.command.carried.empty()) return "not provable: the mass of a body changes";
+    for (size_t b = 0; b < start.command.carried.size(); ++b) {
+      carried_[b] = Times(T(start.command.carried[b]), carried_[b]);
+    }
     for (const LoadSample& load : start.command.loads) {
       const auto b = static_cast<size_t>(load.body);
       exact::Vector<T> f = exact::Lifted<T>(load.force), m = exact::Lifted<T>(load.moment);
@@ -1257,16 +1259,23 @@ std::set<size_t> ChosenSamples(size_t count, size_t spread, size_t worst) {
 }
 
 // The largest values of a witness' channels by quantity and unit, over the whole motion: errors
-// relate to them. Rates and accelerations that a motion has not are as large as those of a motion
-// over the same range in its time, which is no less than a share of a radian or of the
-// characteristic length; forces by themselves at least a share of the weights and of the largest
+// relate to them. Positions are at least a share of a radian or of the characteristic length; rates
+// and accelerations that a motion has not are as large as those of a motion over the same range, or
+// that share, in its time; forces by themselves at least a share of the weights and of the largest
 // drive force, moments with the characteristic length; base forces and reactions are no smaller
 // than drive forces.
 constexpr double kLeastShare = 1e-6;
 class Scales {
  public:
   Scales(const Trace& trace, const Mechanism& mechanism, double duration_s)
-      : trace_(trace), length_(CharacteristicLength(mechanism)) {
+      : trace_(trace),
+        length_(CharacteristicLength(mechanism)),
+        least_{{"m", kLeastShare * length_},
+               {"rad", kLeastShare},
+               {"m/s", kLeastShare * length_ / duration_s},
+               {"rad/s", kLeastShare / duration_s},
+               {"m/s^2", kLeastShare * length_ / (duration_s * duration_s)},
+               {"rad/s^2", kLeastShare / (duration_s * duration_s)}} {
     for (const Body& body : mechanism.bodies) force_ += body.mass * mechanism.gravity_W.norm();
     force_ *= kLeastShare;
     for (size_t c = 0; c < trace.channels.size(); ++c) {
@@ -1301,8 +1310,10 @@ class Scales {
       case Quantity::kBaseForce:
       case Quantity::kReaction:
         return std::max(largest, force);
-      default:
-        return largest;
+      default: {
+        const auto least = least_.find(channel.unit);
+        return least == least_.end() ? largest : std::max(largest, least->second);
+      }
     }
   }
 
@@ -1312,6 +1323,7 @@ class Scales {
   }
   const Trace& trace_;
   const double length_;
+  const std::map<std::string, double> least_;  // by unit
   double force_ = 0.0;
   std::map<std::pair<int, std::string>, double> largest_;
 };
