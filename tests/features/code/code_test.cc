@@ -202,8 +202,8 @@ TEST_F(CodeOfAnkle, StartsFromAProvedTable) {
 
 // Ends before the loops do not close any more: nothing out of reach is served.
 TEST_F(CodeOfAnkle, TableEndsWhereTheRodsDo) {
-  const std::vector<CodeRange> wide = {{"ankle.0", -2.0, 2.0}, {"ankle.1", -0.9, 0.9}};
-  const CodeResult result = Make({.ranges = wide, .cells = 64, .states = 1000});
+  const std::vector<CodeRange> wide = {{"ankle.0", -1.5, 1.2}, {"ankle.1", -0.5, 0.5}};
+  const CodeResult result = Make({.ranges = wide, .cells = 32, .states = 1000});
   ASSERT_EQ(result.judgements.size(), 3U) << Described(result);
   EXPECT_GT(result.table_share, 0.3);
   EXPECT_LT(result.table_share, 0.95);
@@ -213,12 +213,12 @@ TEST_F(CodeOfAnkle, TableEndsWhereTheRodsDo) {
   std::string all = FileOf(result, "parallel_ankle.h");
   const size_t from = all.find("{", all.find("proved[] = ")), to = all.find("}", from);
   std::string bytes;
-  for (int k = 0; k < 64 * 64 / 8; ++k) bytes += (k > 0 ? ", " : "") + std::string("255");
+  for (int k = 0; k < 32 * 32 / 8; ++k) bytes += (k > 0 ? ", " : "") + std::string("255");
   all.replace(from + 1, to - from - 1, bytes);
   const std::filesystem::path file = place_.folder() / "all.h";
   ASSERT_EQ(WriteFile(file, all), "");
   const CodeResult wrong =
-      Make({.ranges = wide, .cells = 64, .states = 1000, .check = file.string()});
+      Make({.ranges = wide, .cells = 32, .states = 1000, .check = file.string()});
   ASSERT_EQ(wrong.judgements.size(), 2U) << Described(wrong);
   EXPECT_TRUE(wrong.judgements[0].agrees()) << Described(wrong);
   EXPECT_FALSE(wrong.judgements[1].agrees()) << Described(wrong);
