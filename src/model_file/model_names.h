@@ -90,6 +90,7 @@ int FindNamed(const std::vector<T>& items, const char* kind, const Block& block,
     if (const int index = IndexOf(items, level + *name); index >= 0) return index;
   }
   std::vector<std::string> names;
+  names.reserve(items.size());
   for (const T& item : items) names.push_back(item.name);
   yaml->Error(node, path + " = " + Describe(node) + ": there is no such " + kind,
               DidYouMean(*name, names));

@@ -99,6 +99,7 @@ TEST(CommandRank, WhatHardlyDiffersFromOthersIsTakenWhereNothingBetterIsPreferre
   leg({-1, -0.2, 0}, {0, -0.2, 0});
   const auto chosen = [&](const std::vector<int>& drives) {
     std::vector<Coordinate> candidates;
+    candidates.reserve(drives.size());
     for (const int d : drives) candidates.push_back({Coordinate::Kind::kDrive, d, 0});
     return ChooseCoordinates(m, candidates, candidates.size());
   };

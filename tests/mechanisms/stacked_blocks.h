@@ -105,6 +105,11 @@ struct RatchetedBlock {
     }
     return low;
   }
+  /// Of the k-th event: it starts, rests, starts, …
+  [[nodiscard]] double EventTime(size_t k) const {
+    const size_t turns = k / 2;
+    return start() + period() * static_cast<double>(turns) + (k % 2 == 0 ? 0.0 : moves());
+  }
   [[nodiscard]] double Position(double t) const {
     if (t < start()) return 0.0;
     const double turns = std::floor((t - start()) / period()), whole = Way(moves());

@@ -145,8 +145,8 @@ TEST(FigureLayout, NothingOverlaps) {
     double below = 0;
     for (size_t k = 0; k < 2; ++k) {
       const PanelPlace& panel = layout.panels[k];
-      const auto rows =
-          static_cast<double>((LegendOf(figure.panels[k]).size() - 1) / panel.legend_columns + 1);
+      const size_t lines = (LegendOf(figure.panels[k]).size() - 1) / panel.legend_columns + 1;
+      const auto rows = static_cast<double>(lines);
       EXPECT_GE(panel.legend_top, below);
       EXPECT_GE(panel.top, panel.legend_top + rows * layout.row);
       EXPECT_GT(panel.left, layout.tick_room + layout.row);

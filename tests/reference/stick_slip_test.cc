@@ -121,10 +121,7 @@ TEST(StickSlip, AFreewheelHoldsOneWay) {
     const MotionEvent& event = run.trace.events[i];
     EXPECT_EQ(event.element, "dry1");
     EXPECT_EQ(event.what, i % 2 == 0 ? Happening::kSlidesUp : Happening::kRests);
-    EXPECT_NEAR(event.time_s,
-                block.start() + block.period() * static_cast<double>(i / 2) +
-                    (i % 2 == 0 ? 0.0 : block.moves()),
-                kFollowed);
+    EXPECT_NEAR(event.time_s, block.EventTime(i), kFollowed);
   }
 }
 

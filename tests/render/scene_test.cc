@@ -39,6 +39,7 @@ TEST(UprightRotation, TurnsUpToZAndKeepsXLevel) {
 
 TEST(CameraFit, TouchesTheMarginsAndCrossesNone) {
   std::vector<Vec3> points;
+  points.reserve(8);
   for (int i = 0; i < 8; ++i) {
     points.emplace_back((i & 1) != 0 ? 2.0 : -0.5, (i & 2) != 0 ? 1.0 : 0.0,
                         (i & 4) != 0 ? 3.0 : 0.2);

@@ -225,14 +225,13 @@ std::string Rods(int digits, double spoilt = 0.0) {
          "</equality><actuator><motor name='m' joint='jrod0'/></actuator></mujoco>";
 }
 
-// Rounded numbers keep overconstrained loops from moving: what the printed digits explain is taken
-// for rounding, and said; no more.
 // A platform on six tendons, a Stewart platform's legs without bodies.
 std::string OnTendons(const std::string& tendon, const std::string& actuators) {
   std::string sites, on_platform, legs;
   for (int i = 0; i < 6; ++i) {
-    const double base = std::numbers::pi / 180.0 * (120.0 * (i / 2) + (i % 2 == 0 ? -10.0 : 10.0));
-    const double top = std::numbers::pi / 180.0 * (120.0 * (i / 2) + (i % 2 == 0 ? -50.0 : 50.0));
+    const int pair = i / 2;
+    const double base = std::numbers::pi / 180.0 * (120.0 * pair + (i % 2 == 0 ? -10.0 : 10.0));
+    const double top = std::numbers::pi / 180.0 * (120.0 * pair + (i % 2 == 0 ? -50.0 : 50.0));
     sites += fmt::format("<site name='b{}' pos='{} {} 0'/>", i, 0.6 * std::cos(base),
                          0.6 * std::sin(base));
     on_platform += fmt::format("<site name='t{}' pos='{} {} 0'/>", i, 0.3 * std::cos(top),
@@ -293,6 +292,8 @@ TEST(MjcfImport, DrivesOfAFloatingRobotGoAsFarAsOfAHeldOne) {
   EXPECT_EQ(stroke(floating, 1), held);
 }
 
+// Rounded numbers keep overconstrained loops from moving: what the printed digits explain is taken
+// for rounding, and said; no more.
 TEST(MjcfImport, LoopsThatOnlyPrintedDigitsKeepFromMovingMove) {
   const test::TestFolder folder("mjcf_rounded");
   for (const int digits : {4, 6, 8}) {
