@@ -1,7 +1,7 @@
 #!/bin/bash
 # One task per shard, then the merge:
 #   job=$(sbatch --parsable slurm-array.sh)
-#   sbatch --dependency=afterany:$job --wrap 'mbverify merge night/shard* --out night/all --history history.sqlite --fail-on-missing'
+#   sbatch --dependency=afterany:$job --wrap 'mbverify merge regression/shard* --out regression/all --history history.sqlite --fail-on-missing'
 #SBATCH --job-name=mbverify
 #SBATCH --array=1-8
 #SBATCH --cpus-per-task=2
@@ -11,4 +11,4 @@
 set -u
 # --resume: a task that was requeued goes on where it was stopped.
 srun mbverify regress --shard "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT" \
-  --jobs "$SLURM_CPUS_PER_TASK" --out "night/shard$SLURM_ARRAY_TASK_ID" --resume
+  --jobs "$SLURM_CPUS_PER_TASK" --out "regression/shard$SLURM_ARRAY_TASK_ID" --resume

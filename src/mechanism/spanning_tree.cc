@@ -96,13 +96,13 @@ std::vector<int> KeepOrder(const Mechanism& mechanism, const ClosureHints& hints
 }  // namespace
 
 bool HasUsedCoordinate(const Mechanism& mechanism, int joint) {
-  return HasLedCoordinate(mechanism, joint) ||
+  return HasDrivenCoordinate(mechanism, joint) ||
          std::ranges::any_of(mechanism.elements, [joint](const ForceElement& element) {
            return element.joint == joint;
          });
 }
 
-bool HasLedCoordinate(const Mechanism& mechanism, int joint) {
+bool HasDrivenCoordinate(const Mechanism& mechanism, int joint) {
   const auto uses = [joint](const auto& item) { return item.joint == joint; };
   return std::ranges::any_of(mechanism.prescribed, uses) ||
          std::ranges::any_of(mechanism.drives,

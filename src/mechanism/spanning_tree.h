@@ -30,7 +30,7 @@ struct SpanningTreeResult {
 SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& hints = {});
 
 /// True when a drive, a prescribed joint or a coupling prescribes a coordinate of this joint.
-[[nodiscard]] bool HasLedCoordinate(const Mechanism& mechanism, int joint);
+[[nodiscard]] bool HasDrivenCoordinate(const Mechanism& mechanism, int joint);
 /// True when one of these or a force element uses a coordinate of this joint.
 [[nodiscard]] bool HasUsedCoordinate(const Mechanism& mechanism, int joint);
 

@@ -732,7 +732,7 @@ class SingularHome {
       for (int c = 0; c < DofsOf(joint.kind); ++c) {
         const CoordinateRange& range = joint.range[c];
         double step = kStep * Unit(joint, c);
-        if (HasLedCoordinate(home_, j)) {
+        if (HasDrivenCoordinate(home_, j)) {
           const double up = range.upper - joint.home[c], down = joint.home[c] - range.lower;
           if (up < 2.0 * step && down > up) step = -std::min(step, 0.5 * down);
         } else {

@@ -157,6 +157,7 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   FollowAngles(mechanism_, followed_, states);
   Factor(t_s, *states);
   states->engaged = command_.engaged;
+  states->carried = command_.carried;
   if (!(pivot() > kLost)) return Singular(t_s, *states);
   if (RunSummary summary = CheckDofs(t_s); !summary.ok()) return summary;
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
@@ -215,6 +216,7 @@ RunSummary FreeDynamics::AccelerateNear(double t_s, BodyStates* states) {
   FollowAngles(mechanism_, followed_, states);
   FillRows(t_s, *states);
   states->engaged = command_.engaged;
+  states->carried = command_.carried;
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
   rates.tail(command_.acceleration.size()) += command_.acceleration;
   Unstack(VecX::Zero(size_), &states->A_WB);

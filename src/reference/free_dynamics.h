@@ -179,7 +179,7 @@ class FreeDynamics {
   [[nodiscard]] RunSummary CheckLoadsUnique(const ForceRows& at, const BodyStates& states) const;
   /// Forces of friction by load along the coordinates, as wrenches (6·bodies).
   [[nodiscard]] VecX LoadFrictionWrenches(const BodyStates& states) const;
-  void FindLedBands(const ForceRows& at, ReferenceSample* sample) const;
+  void FindPrescribedBands(const ForceRows& at, ReferenceSample* sample) const;
   void SolveForces(double t_s, ReferenceSample* sample);
   /// Per drive: the given force at t, or the next of those solved for.
   [[nodiscard]] VecX GivenOr(double t_s, const VecX& solved) const;

@@ -303,11 +303,11 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
   sample->drive_force = GivenOr(t_s, force.segment(at.first_driven, drives));
   sample->prescribed_force =
       force.segment(at.first_prescribed, at.first_held - at.first_prescribed);
-  FindLedBands(at, sample);
+  FindPrescribedBands(at, sample);
 }
 
 // Friction at rest is what the held state needs: nothing is open but for what commands hold.
-void FreeDynamics::FindLedBands(const ForceRows& at, ReferenceSample* sample) const {
+void FreeDynamics::FindPrescribedBands(const ForceRows& at, ReferenceSample* sample) const {
   sample->drive_band = VecX::Zero(sample->drive_force.size());
   sample->prescribed_band = VecX::Zero(sample->prescribed_force.size());
   if (phase_.prescribed.empty()) return;

@@ -180,7 +180,9 @@ RunSummary FreeMotion::Start(const BodyStates& states) {
   RunSummary summary = dynamics_.Accelerate(0.0, &now_.states);
   now_.pivot = largest_pivot_ = dynamics_.pivot();
   if (summary.ok() && !friction_elements_.empty()) summary = BeginFriction();
-  if (summary.ok()) NoteEvents();
+  if (!summary.ok()) return summary;
+  NoteFriction();
+  NoteCorners();
   return summary;
 }
 
@@ -343,7 +345,7 @@ RunSummary FreeMotion::Segment(double to_s) {
   time_.StartFrom(now_.time_s);
   if (!motion_.switches.empty()) {
     if (RunSummary summary = SwitchFriction(to_s); !summary.ok()) return summary;
-    NoteEvents();
+    NoteFriction();
   }
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
   while (to_s - now_.time_s > 1e-14 * std::max(duration_s_, to_s)) {
@@ -355,7 +357,7 @@ RunSummary FreeMotion::Segment(double to_s) {
       if (RunSummary summary = LookAhead(); !summary.ok()) return summary;
     }
     if (RunSummary summary = CheckFriction(); !summary.ok()) return summary;
-    NoteEvents();
+    NoteFriction();
     double t = now_.time_s;
     State x = Pack(now_);
     const double natural = dt_;
@@ -381,7 +383,8 @@ RunSummary FreeMotion::Segment(double to_s) {
       t = to_s;
     }
     if (RunSummary summary = AcceptWithFriction(x, t, corner); !summary.ok()) return summary;
-    NoteEvents();
+    NoteFriction();
+    NoteCorners();
     if (tried < kSmallestStepShare * duration_s_ && !to_the_end) return NoWayOn(tried);
   }
   return RunSummary::Done();
@@ -398,7 +401,7 @@ std::vector<int> FreeMotion::PiecesAt(const State& x) const {
 }
 
 // At a dead centre friction neither rests nor slides: it goes on as before.
-void FreeMotion::NoteEvents() {
+void FreeMotion::NoteFriction() {
   const FrictionPhase& phase = dynamics_.phase();
   const auto note = [&](size_t e, Happening now) {
     log_.Note(mechanism_.elements[e], now_.time_s, now);
@@ -410,6 +413,9 @@ void FreeMotion::NoteEvents() {
   for (const size_t e : friction_elements_) {
     if (phase.sign[e] != 0) note(e, HappeningAt(phase.sign[e]));
   }
+}
+
+void FreeMotion::NoteCorners() {
   if (corner_elements_.empty()) return;
   const std::vector<int> pieces = PiecesAt(Pack(now_));
   for (size_t k = 0; k < pieces.size(); ++k) {
@@ -445,7 +451,7 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
     RunSummary summary = SwitchFriction(now_.time_s + motion_.sample_s);
     if (summary.ok()) summary = CheckFriction();
     if (!summary.ok()) return summary;
-    NoteEvents();
+    NoteFriction();
   }
   on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(duration_s_, t_s);
   if (on_bridge_) return SampleBridge(t_s);

@@ -89,7 +89,8 @@ class FreeMotion {
   /// Of the laws with corners (PieceOf()), in the order of corner_elements_.
   [[nodiscard]] std::vector<int> PiecesAt(const State& x) const;
   [[nodiscard]] double TimeToCorner(double h, const State& to);
-  void NoteEvents();
+  void NoteFriction();
+  void NoteCorners();
   [[nodiscard]] RunSummary SampleBridge(double t_s);
   /// Time to the singular pose ahead, if the weakest pivot goes on as between the last two nodes.
   [[nodiscard]] double TimeToSingular() const;

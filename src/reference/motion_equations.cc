@@ -49,7 +49,9 @@ void MotionEquations::ForInertias(const BodyStates& states, const AddInertia& ad
   for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
     const Body& body = mechanism_.bodies[b];
     const Mat3 R = states.X_WB[b].linear();
-    add(b, b, SpatialInertia(body.mass, R * body.p_BoBcm_B, R * body.I_Bcm_B * R.transpose()));
+    add(b, b,
+        states.Carried(b) *
+            SpatialInertia(body.mass, R * body.p_BoBcm_B, R * body.I_Bcm_B * R.transpose()));
   }
   ForRotorInertias(mechanism_, states, add);
 }

@@ -144,7 +144,7 @@ TEST(TableTube, TwoRowsOfAHundredAreMoreThanOutliers) {
   EXPECT_FALSE(Says(c.Run(), "rows only"));
 }
 
-TEST(TableTube, NoisePassesAndTwiceTheNoiseAsABendFails) {
+TEST(TableTube, NoisePassesAndASmoothErrorOfTwiceTheNoiseFails) {
   for (const bool perturbed : {false, true}) {
     TableCase c;
     std::mt19937_64 random(7);

@@ -83,7 +83,7 @@ TEST_F(JsonOutput, OfOtherCommandsHoldsTheirNumbers) {
   EXPECT_LT(volume["error"].get<double>(), 1e-9 * volume["value"].get<double>());
 }
 
-TEST_F(JsonOutput, OfNightsAndTheirHistory) {
+TEST_F(JsonOutput, OfRegressionRunsAndTheirHistory) {
   const std::string history = mbverify.folder() / "history.sqlite";
   for (int run = 0; run < 2; ++run) {
     const Json regression =

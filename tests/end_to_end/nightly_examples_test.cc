@@ -125,7 +125,7 @@ TEST(NightlyExamples, TheGitlabPipelineHangsTogether) {
   }
   EXPECT_EQ(jobs, 3U);
   EXPECT_EQ(pipeline["report"]["artifacts"]["reports"]["junit"].as<std::string>(),
-            "night/junit.xml");
+            "regression/junit.xml");
   EXPECT_EQ(pipeline["report"]["when"].as<std::string>(), "always");
   EXPECT_TRUE(pipeline["build"]["cache"]);
 }

@@ -93,7 +93,7 @@ TEST(ElasticModel, SectionsHaveTheirTextbookValues) {
   EXPECT_EQ(own.area + 10 * own.I_y + 100 * own.I_z + 1000 * own.torsion, 4321);
 }
 
-TEST(ElasticModel, ARectangleBendsEasierAcrossItsShortEdge) {
+TEST(ElasticModel, ARectangleIsSofterAcrossItsShortEdge) {
   const Section bar = Loaded(kBracket).beams[0].section;
   EXPECT_NEAR(bar.area, 2e-4, 1e-4 * kFewRoundings);
   EXPECT_NEAR(bar.I_y, 0.01 * std::pow(0.02, 3) / 12, 1e-8 * kFewRoundings);

@@ -35,7 +35,7 @@ Mechanism Jack() {
 }
 
 // From six turns beside home, by up to three turns and more from sample to sample.
-TEST(Turns, OfAMotorWhoseNutIsLedAreCounted) {
+TEST(Turns, OfAMotorWhoseNutCannotTurnAreCounted) {
   const Mechanism m = Jack();
   Motion motion;
   motion.duration_s = 2.0;

@@ -1260,10 +1260,10 @@ std::set<size_t> ChosenSamples(size_t count, size_t spread, size_t worst) {
 
 // The largest values of a witness' channels by quantity and unit, over the whole motion: errors
 // relate to them. Positions are at least a share of a radian or of the characteristic length; rates
-// and accelerations that a motion has not are as large as those of a motion over the same range, or
-// that share, in its time; forces by themselves at least a share of the weights and of the largest
-// drive force, moments with the characteristic length; base forces and reactions are no smaller
-// than drive forces.
+// and accelerations that a motion has not are as large as those of a motion over the same range, at
+// least that share, in its time; forces by themselves at least a share of the weights and of the
+// largest drive force, moments with the characteristic length; base forces and reactions are no
+// smaller than drive forces.
 constexpr double kLeastShare = 1e-6;
 class Scales {
  public:
@@ -1289,8 +1289,7 @@ class Scales {
         force_ = std::max(force_, channel.unit == "N" ? size : size / length_);
       }
       if (channel.quantity != Quantity::kPosition) continue;
-      const double range = std::max(column.maxCoeff() - column.minCoeff(),
-                                    kLeastShare * (channel.unit == "m" ? length_ : 1.0));
+      const double range = column.maxCoeff() - column.minCoeff();
       for (const auto& [quantity, power, per] : {std::tuple(Quantity::kVelocity, 1, "/s"),
                                                  std::tuple(Quantity::kAcceleration, 2, "/s^2")}) {
         double& floor = largest_[Key(quantity, channel.unit + per)];

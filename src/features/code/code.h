@@ -112,8 +112,8 @@ struct CodeTask {
 // so that the branch is that of home.
 
 /// Over the box; cells (CodeSettings::cells) that are not proved are outside. At most three
-/// coordinates. An empty table
-/// (no cells) with `why` where a proof is beyond it: balls that are searched, large blocks.
+/// coordinates. An empty table (no cells) with `why` where a proof is beyond it: balls that are
+/// searched, large blocks.
 [[nodiscard]] StartTable MakeStartTable(const MechanismFormulas& formulas, const VecX& low,
                                         const VecX& high, int cells, std::string* why,
                                         const std::function<void(double)>& progress);

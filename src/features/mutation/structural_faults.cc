@@ -292,7 +292,7 @@ class Collector {
       Joint& joint = wrong.joints[j];
       joint.range = {};
       joint.guess = joint.home;
-      if (joint.closure || HasLedCoordinate(m_, static_cast<int>(j))) continue;
+      if (joint.closure || HasDrivenCoordinate(m_, static_cast<int>(j))) continue;
       for (int c = 0; c < DofsOf(joint.kind); ++c) {
         joint.guess[static_cast<size_t>(c)] +=
             IsLength(joint.kind, c) ? size * share(*random) : angle(*random);

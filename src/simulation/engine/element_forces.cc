@@ -404,7 +404,7 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
   return RunSummary::Done();
 }
 
-void FindLed(EngineModel* engine) {
+void FindPrescribedElements(EngineModel* engine) {
   // A share of a coordinate that loops and commands leave open; less is round-off.
   constexpr double kPrescribed = 1e-9;
   const DataHandle data = MakeData(*engine->m);

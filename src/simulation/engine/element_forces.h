@@ -107,7 +107,7 @@ struct ElementSlope {
 [[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion,
                                        DriveMode drives, bool own_events);
 /// Finds the elements that are prescribed, at the model's reference pose.
-void FindLed(EngineModel* engine);
+void FindPrescribedElements(EngineModel* engine);
 
 /// True if there is something that MuJoCo lacks.
 [[nodiscard]] bool HasLacking(const Mechanism& mechanism);

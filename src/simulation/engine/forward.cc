@@ -167,7 +167,9 @@ void StickSlip::NoteEvents(double t_s) {
     const ForceElement& element = elements[corners_[k]];
     log_.Note(element, t_s, HappeningOn(element, pieces_[k]), pieces_[k]);
   }
-  s_.run->trace.events = log_.events();
+  std::vector<MotionEvent>& events = s_.run->trace.events;
+  events.insert(events.end(), log_.events().begin() + static_cast<long>(events.size()),
+                log_.events().end());
 }
 
 std::vector<int> StickSlip::Pieces() const {

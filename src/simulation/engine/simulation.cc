@@ -169,7 +169,9 @@ void Session::EvaluateLoads(double t_s) {
 
 void Session::SetPayloads(double t_s) {
   if (payloads.empty()) return;
+  const std::vector<double> before = carried;
   EvaluatePayloads(motion, until(t_s), &carried);
+  if (carried == before) return;
   mjModel* m = engine.m.get();
   for (const Payload& payload : payloads) {
     m->body_mass[payload.id] = carried[payload.body] * payload.mass;
@@ -298,7 +300,7 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
     return summary;
   }
   if (motion.free() || IsReleased(engine)) {
-    FindLed(&engine);
+    FindPrescribedElements(&engine);
     AddFrictionRows(&engine);
     AddArmatures(&engine);
   }

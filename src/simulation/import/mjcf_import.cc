@@ -350,8 +350,8 @@ void AddDrive(int u, MjcfImport* in) {
     for (const auto& [other, word] : kOthers) {
       if (type == other) attribute = word;
     }
-    in->LeaveOut(std::string(attribute) == "joint" ? "actuator of a ball" : "actuator/general",
-                 attribute,
+    const bool on_joint = type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT;
+    in->LeaveOut(on_joint ? "actuator of a ball" : "actuator/general", attribute,
                  fmt::format("actuator '{}', which does not act on a hinge or slide,", name));
     return;
   }

@@ -12,7 +12,7 @@ namespace {
 
 using cabin_audit::Lengths;
 
-constexpr double kBend = 1.0 + 1e-6, kBend_m = 1e-6;
+constexpr double kPerturb = 1.0 + 1e-6, kPerturb_m = 1e-6;
 
 const Mechanism& Robot() {
   static const Mechanism mechanism =
@@ -40,7 +40,7 @@ TEST(CabinAudit, PerturbedLengthsLeaveEquationsUnconfirmed) {
   const Lengths truth = cabin_audit::LengthsOf(Robot());
   const auto unconfirmed = [&](double Lengths::*length) {
     Lengths perturbed = truth;
-    perturbed.*length += kBend_m;  // some are zero
+    perturbed.*length += kPerturb_m;  // some are zero
     std::set<std::string> equations = Unconfirmed(PositionRows(perturbed, truth));
     equations.merge(Unconfirmed(VelocityRows(perturbed, truth)));
     equations.merge(Unconfirmed(WristRows(perturbed, truth)));
@@ -72,7 +72,7 @@ TEST(CabinAudit, PerturbedLengthsLeaveEquationsUnconfirmed) {
 TEST(CabinAudit, APerturbedMassLeavesTheDynamicsUnconfirmed) {
   Mechanism perturbed = Robot();
   for (Parameter& p : perturbed.parameters) {
-    if (p.name == "m_AB") p.value *= kBend;
+    if (p.name == "m_AB") p.value *= kPerturb;
   }
   const auto equations = Unconfirmed(cabin_audit::DynamicsRows(perturbed, Robot()));
   EXPECT_TRUE(equations.contains("(47)"));

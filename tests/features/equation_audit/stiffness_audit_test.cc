@@ -49,17 +49,17 @@ TEST(StiffnessAudit, CabinsPerturbedConstantsLeaveEquationsUnconfirmed) {
     perturb(&p);
     return With(cabin_audit::StiffnessRows(kModels, p), AuditVerdict::kWrongAndUnfixed);
   };
-  constexpr double kBend = 1 + 1e-8;
-  const auto strut = unconfirmed([](auto* p) { p->sections[cabin_robot::kBeamEF].h *= kBend; });
+  constexpr double kPerturb = 1 + 1e-8;
+  const auto strut = unconfirmed([](auto* p) { p->sections[cabin_robot::kBeamEF].h *= kPerturb; });
   EXPECT_TRUE(strut.contains("(56)–(61)"));
   EXPECT_TRUE(strut.contains("(65) K_AB"));
   EXPECT_FALSE(strut.contains("(65) K_CD"));
-  const auto link = unconfirmed([](auto* p) { p->sections[cabin_robot::kBeamCD].b *= kBend; });
+  const auto link = unconfirmed([](auto* p) { p->sections[cabin_robot::kBeamCD].b *= kPerturb; });
   EXPECT_TRUE(link.contains("(65) K_CD"));
   EXPECT_TRUE(link.contains("(62)–(64), (66)–(68)"));
-  EXPECT_TRUE(unconfirmed([](auto* p) { p->w *= kBend; }).contains("(62)–(64), (66)–(68)"));
-  EXPECT_TRUE(unconfirmed([](auto* p) { p->wrist.a3 *= kBend; }).contains("(69)–(75)"));
-  EXPECT_TRUE(unconfirmed([](auto* p) { p->E *= kBend; }).contains("(54)"));
+  EXPECT_TRUE(unconfirmed([](auto* p) { p->w *= kPerturb; }).contains("(62)–(64), (66)–(68)"));
+  EXPECT_TRUE(unconfirmed([](auto* p) { p->wrist.a3 *= kPerturb; }).contains("(69)–(75)"));
+  EXPECT_TRUE(unconfirmed([](auto* p) { p->E *= kPerturb; }).contains("(54)"));
 }
 
 TEST(StiffnessAudit, ScarasPerturbedConstantsLeaveEquationsUnconfirmed) {

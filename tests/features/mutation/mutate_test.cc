@@ -206,7 +206,7 @@ TEST(Mutate, WhatIsMissedAtTheSizeAskedForIsSearchedForAbove) {
   EXPECT_EQ(report.exit_code, 1);  // it matters and was missed
 }
 
-TEST(Mutate, WhatForcesCannotSeeIsProvedByBendsOfTenPercent) {
+TEST(Mutate, WhatForcesCannotSeeIsProvedByPerturbationsOfTenPercent) {
   const MutationReport report = Mutate("spr_tripod/default_inverse", Plain());
   for (const Mutation& m : report.mutations) {
     if (m.own.detected) continue;

@@ -100,7 +100,7 @@ TEST_F(HistoryTest, SaysWhichWitnessTookAStepOnce) {
   EXPECT_NE(DriftsOf(both).at(0).text.find("model file changed"), std::string::npos);
 }
 
-TEST_F(HistoryTest, EqualNightsShareOneCopyOfTheirTraces) {
+TEST_F(HistoryTest, EqualRunsShareOneCopyOfTheirTraces) {
   for (int i = 0; i < 5; ++i) Record(1e-9, "", Forces(1, 2));
   EXPECT_EQ(Count("SELECT COUNT(*) FROM golden"), 10);
   EXPECT_EQ(Count("SELECT COUNT(*) FROM trace"), 2);

@@ -319,7 +319,7 @@ TEST_F(MergeTest, AShardThatDidNotEndIsMissing) {
   }
 }
 
-TEST_F(MergeTest, PartsOfDifferentNightsAreRefused) {
+TEST_F(MergeTest, PartsOfDifferentRunsAreRefused) {
   const std::string kept = Read("shard2/regress.json");
   const std::map<std::string, std::pair<std::string, std::string>> changes = {
       {"label", {"another", "has label 'another'"}},
