@@ -32,7 +32,7 @@ using internal::Amount;
 using internal::AmountOf;
 using internal::Failed;
 using internal::NameOf;
-using internal::Place;
+using internal::ChannelAndTime;
 
 // What the force of the worst drive looks like: opposite sign or a constant factor. A force that
 // hardly varies has a constant ratio to anything, so a factor that no unit explains must explain
@@ -177,7 +177,7 @@ Attribution TwoDiffer(const ComparisonInput& input, const Comparison& comparison
   attribution.text = fmt::format(
       "{} and {} differ by {} in {}: worst at {}{}; {}", NameOf(comparison, pair.measured),
       NameOf(comparison, pair.truth), AmountOf(check), RowOf(check.metric).title,
-      Place(check.channel, check.time_s), Hint(pair, worst), attribution.text);
+      ChannelAndTime(check.channel, check.time_s), Hint(pair, worst), attribution.text);
   return attribution;
 }
 
@@ -328,7 +328,7 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
   const std::string text = fmt::format(
       "{} agree to {}, {} differs by {} in {}{}: worst at {}{}", Listed(comparison, agree),
       Amount(agree_to, yardstick.unit), NameOf(comparison, odd), amount(far), yardstick.title, tube,
-      Place(far.where.channel, far.where.time_s), Hint(*far.pair, far.where));
+      ChannelAndTime(far.where.channel, far.where.time_s), Hint(*far.pair, far.where));
   const std::string energy = odd == role::kSimulated ? internal::EnergyHint(comparison) : "";
   return {odd, text + energy,
           Attribution::Split{.agree = agree,
@@ -352,7 +352,7 @@ Attribution BySingleCheck(const Comparison& comparison) {
     }
     const std::string energy =
         check.subject == role::kSimulated ? internal::EnergyHint(comparison) : "";
-    const std::string place = Place(check.channel, check.time_s);
+    const std::string place = ChannelAndTime(check.channel, check.time_s);
     return {check.subject, fmt::format("{}: {} is {}{}{}", NameOf(comparison, check.subject),
                                        RowOf(check.metric).title, AmountOf(check),
                                        place.empty() ? "" : " at ", place) +
@@ -437,7 +437,7 @@ std::string AmountOf(const CheckResult& check) {
   return Amount(check.value, RowOf(check.metric).unit);
 }
 
-std::string Place(const std::string& channel, double time_s) {
+std::string ChannelAndTime(const std::string& channel, double time_s) {
   return std::isnan(time_s) ? channel : fmt::format("{}, t = {:.4g} s", channel, time_s);
 }
 
@@ -601,7 +601,7 @@ const char* DriveNoun(Metric metric) {
 // "misses the commanded motion by 0.001 m at plate.x, t = 0.3 s"
 std::string MissText(const CheckResult& check) {
   return fmt::format("misses the {} by {} at {}", CommandedNoun(check.metric), AmountOf(check),
-                     Place(check.channel, check.time_s));
+                     ChannelAndTime(check.channel, check.time_s));
 }
 
 Attribution ByDerivatives(const Comparison& comparison) {
@@ -609,9 +609,10 @@ Attribution ByDerivatives(const Comparison& comparison) {
     const char* name = role->name;
     const CheckResult* check = comparison.FindCheck(*role, Metric::kDerivatives);
     if (!Failed(check)) continue;
-    return {name, fmt::format("{}: its drive rates are not the time derivatives of its drive "
-                              "positions; they differ by {} at {}",
-                              name, AmountOf(*check), Place(check->channel, check->time_s))};
+    return {name,
+            fmt::format("{}: its drive rates are not the time derivatives of its drive "
+                        "positions; they differ by {} at {}",
+                        name, AmountOf(*check), ChannelAndTime(check->channel, check->time_s))};
   }
   return {};
 }
@@ -637,7 +638,8 @@ std::string TableMissText(const ComparisonInput& input, const Comparison& compar
   const bool another = (check.metric == Metric::kCommandM || check.metric == Metric::kCommandRad) &&
                        !(check.value <= kAnotherMotion * SpanOf(*input.motion, check.channel));
   return fmt::format("the table {} does not follow the commanded motion: {} off at {}{}",
-                     comparison.table->name, AmountOf(check), Place(check.channel, check.time_s),
+                     comparison.table->name, AmountOf(check),
+                     ChannelAndTime(check.channel, check.time_s),
                      another ? "; does it belong to another motion?" : "");
 }
 
@@ -724,7 +726,7 @@ std::string OtherText(const Comparison& comparison, const Opinions& opinions) {
             : "the " + NameOf(comparison, opinions.other) + ", which meets the command, needs";
   return fmt::format("{} {} that differ by {} (worst at {})", who,
                      DriveNoun(opinions.differ->metric), AmountOf(*opinions.differ),
-                     Place(opinions.differ->channel, opinions.differ->time_s));
+                     ChannelAndTime(opinions.differ->channel, opinions.differ->time_s));
 }
 
 // The opinions differ, and the simulation meets the command with the driver's. Another assembly
@@ -738,7 +740,7 @@ Attribution OtherIsWrong(const ComparisonInput& input, const Comparison& compari
       "under the {} drive motion the simulation meets the command; {}{}'s {} differ from it by {} "
       "(worst at {})",
       opinions.driver, comparison.table ? "" : "the ", NameOf(comparison, opinions.other),
-      DriveNoun(differ.metric), AmountOf(differ), Place(differ.channel, differ.time_s));
+      DriveNoun(differ.metric), AmountOf(differ), ChannelAndTime(differ.channel, differ.time_s));
   const bool position =
       differ.metric == Metric::kPositionM || differ.metric == Metric::kPositionRad;
   const double size =

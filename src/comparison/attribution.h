@@ -11,7 +11,7 @@ namespace mbv::internal {
 [[nodiscard]] std::string Amount(double value, const std::string& unit);
 [[nodiscard]] std::string AmountOf(const CheckResult& check);
 /// "d1.force, t = 0.3 s"; without a time the channel alone.
-[[nodiscard]] std::string Place(const std::string& channel, double time_s);
+[[nodiscard]] std::string ChannelAndTime(const std::string& channel, double time_s);
 /// "simulation", "the generic solver", "the table forces.csv", …
 [[nodiscard]] std::string NameOf(const Comparison& comparison, const std::string& witness);
 

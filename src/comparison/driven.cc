@@ -132,7 +132,7 @@ std::string Astray(const ComparisonInput& input, const CheckResult& check) {
 // "drive force, RMS, by 1.2e-04, worst at leg1.force, t = 0.2 s"
 std::string DifferenceText(const CheckResult& check) {
   return fmt::format("{} by {}, worst at {}", RowOf(check.metric).title, Amount(check),
-                     internal::Place(check.channel, check.time_s));
+                     internal::ChannelAndTime(check.channel, check.time_s));
 }
 
 // The simulation goes where the driver's forces lead it, so that it judges these forces; the other
@@ -162,7 +162,7 @@ Attribution AttributeForceDriven(const ComparisonInput& input, const Comparison&
     const std::string text = fmt::format(
         "driven by the {} forces, the simulation leaves the commanded motion: {} {} at {}{}",
         driver, RowOf(leaves->metric).title, Amount(*leaves),
-        internal::Place(leaves->channel, leaves->time_s), Astray(input, *leaves));
+        internal::ChannelAndTime(leaves->channel, leaves->time_s), Astray(input, *leaves));
     if (other.empty()) {
       return {"", text +
                       "; a third witness would show whether the forces or the simulated model "

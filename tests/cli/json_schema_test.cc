@@ -63,7 +63,7 @@ constexpr Call kCalls[] = {
     {"check OUT/bad.yaml", 2},
     {"list", 0},
     {"inertia OUT/box.urdf", 1},
-    {"survey OUT", 0},
+    {"survey OUT/box.urdf OUT/servo.xml", 0},
     {"log four_bar OUT/x/four_bar/turn_inverse/traces.csv --no-pictures --out OUT/x", 0},
     {"log four_bar OUT/box.obj --no-pictures --out OUT/x", 2},
     {"standin tests/mechanisms/parallel_ankle.yaml --joints ankle.0,ankle.1 --resolution 3 "

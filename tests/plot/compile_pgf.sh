@@ -60,7 +60,8 @@ TEX
   echo "$name: $wanted mm"
 }
 
-"$mbverify" figures stabilizing_platform/sea_state --formats pgf --out "$work/ieee" >/dev/null
+"$mbverify" figures stabilizing_platform/sea_state --formats pgf --out "$work/ieee" \
+  --set motion.sample_s=0.1 >/dev/null  # TeX takes 12 s for 1200 points
 "$mbverify" figures scara_robot/stiffness --style springer --formats pgf --out "$work/springer" >/dev/null
 "$mbverify" figures --paper stabilizing_platform fig10 --formats pgf --out "$work/paper" >/dev/null
 count=0
