@@ -30,9 +30,9 @@ namespace {
 
 using internal::Amount;
 using internal::AmountOf;
+using internal::ChannelAndTime;
 using internal::Failed;
 using internal::NameOf;
-using internal::ChannelAndTime;
 
 // What the force of the worst drive looks like: opposite sign or a constant factor. A force that
 // hardly varies has a constant ratio to anything, so a factor that no unit explains must explain

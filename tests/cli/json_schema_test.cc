@@ -62,10 +62,10 @@ constexpr Call kCalls[] = {
     {"check four_bar/foreign", 0},
     {"check OUT/bad.yaml", 2},
     {"list", 0},
-    {"inertia OUT/box.urdf", 1},
-    {"survey OUT/box.urdf OUT/servo.xml", 0},
+    {"inertia OUT/robots/box.urdf", 1},
+    {"survey OUT/robots", 0},
     {"log four_bar OUT/x/four_bar/turn_inverse/traces.csv --no-pictures --out OUT/x", 0},
-    {"log four_bar OUT/box.obj --no-pictures --out OUT/x", 2},
+    {"log four_bar OUT/robots/box.obj --no-pictures --out OUT/x", 2},
     {"standin tests/mechanisms/parallel_ankle.yaml --joints ankle.0,ankle.1 --resolution 3 "
      "--range ankle.0_deg=-2:2 --range ankle.1_deg=-2:2 --export --out OUT/y",
      0},
@@ -86,7 +86,7 @@ constexpr Call kCalls[] = {
     {"package four_bar/static -o OUT/paper.zip", 0},
     {"package OUT/bad.yaml -o OUT/bad.zip", 2},
     {"package --check OUT/paper.zip", 0},
-    {"package --check OUT/box.urdf", 2},
+    {"package --check OUT/robots/box.urdf", 2},
     {"regress four_bar/static four_bar/must_fail OUT/wrong.yaml OUT/bad.yaml --no-pictures "
      "--no-reports --out OUT/regress",
      2},
@@ -139,13 +139,13 @@ class JsonSchemaTest : public testing::Test {
 
   // What every call prints, and the files that they leave.
   std::vector<Document> Documents() {
-    fs::create_directories(mbverify.folder() / "in");
+    fs::create_directories(mbverify.folder() / "in" / "robots");
     Write("bad.yaml", "scenario: bad\nmodel: four_bar\nmotoin: {}\n");
     Write("wrong.yaml", std::string("model: four_bar\nparameters: {rho: 1}\n") +
                             "motion: {duration_s: 0.1, commands: {motor: 0.5}}\n" +
                             "reference: {parameters: {rho: 2}}\nexpect: {verdict: agree}\n");
-    Write("box.urdf", kBox);
-    Write("box.obj", kMesh);
+    Write("robots/box.urdf", kBox);
+    Write("robots/box.obj", kMesh);
     const ProgramResult servo =
         mbverify(Placed("model four_bar --format mjcf --drives servo "
                         "--out OUT/servo.xml"));
