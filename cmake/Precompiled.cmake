@@ -16,5 +16,5 @@ set(MBV_COMMON_HEADERS
     <base/eigen_instances.h>)
 mbv_precompiled(mbv_pch LIBS Eigen3::Eigen fmt::fmt HEADERS ${MBV_COMMON_HEADERS})
 mbv_precompiled(mbv_light_pch LIBS Eigen3::Eigen fmt::fmt nlohmann_json::nlohmann_json
-                HEADERS ${MBV_COMMON_HEADERS} <nlohmann/json.hpp>)
+                CLI11::CLI11 HEADERS ${MBV_COMMON_HEADERS} <nlohmann/json.hpp> <CLI/CLI.hpp>)
 mbv_light(mbv_light_pch)

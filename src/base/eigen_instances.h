@@ -42,8 +42,15 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
                                                                       Eigen::VectorXd&) const;   \
   DECLARATION void Eigen::ColPivHouseholderQR<Eigen::MatrixXd>::_solve_impl(                     \
       const Eigen::VectorXd&, Eigen::VectorXd&) const;                                           \
+  DECLARATION void Eigen::ColPivHouseholderQR<Eigen::MatrixXd>::_solve_impl(                     \
+      const Eigen::MatrixXd&, Eigen::MatrixXd&) const;                                           \
   DECLARATION void Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>::_solve_impl(         \
-      const Eigen::VectorXd&, Eigen::VectorXd&) const;
+      const Eigen::VectorXd&, Eigen::VectorXd&) const;                                           \
+  DECLARATION void Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>::_solve_impl(         \
+      const Eigen::MatrixXd&, Eigen::MatrixXd&) const;                                           \
+  DECLARATION void                                                                               \
+  Eigen::HouseholderSequence<Eigen::MatrixXd, Eigen::VectorXd>::applyThisOnTheLeft(              \
+      Eigen::MatrixXd&, Eigen::VectorXd&, bool) const;
 
 MBV_EIGEN_INSTANCES(extern template)
 

@@ -223,7 +223,7 @@ TEST(RowFactors, ForcesOfAFreeMotionAreThoseOfDenseLeastNorm) {
     Eigen::CompleteOrthogonalDecomposition<MatX> cod;
     cod.setThreshold(1e-9);
     cod.compute(columns);
-    VecX force = cod.solve(scales.body_scale().cwiseProduct(Stack(required)));
+    VecX force = cod.solve(VecX(scales.body_scale().cwiseProduct(Stack(required))));
     for (int i = 0; i < rows.size(); ++i) force[i] *= scales.RowScale(rows.angular[i]);
     MatX reactions;
     int next = FillReactions(mechanism, sample.states, rows, force, &reactions);
@@ -237,7 +237,7 @@ TEST(RowFactors, ForcesOfAFreeMotionAreThoseOfDenseLeastNorm) {
     }
     // A mass that is wrong by a millionth shows.
     required.back() *= 1.0 + 1e-6;
-    VecX wrong = cod.solve(scales.body_scale().cwiseProduct(Stack(required)));
+    VecX wrong = cod.solve(VecX(scales.body_scale().cwiseProduct(Stack(required))));
     for (int i = 0; i < rows.size(); ++i) wrong[i] *= scales.RowScale(rows.angular[i]);
     EXPECT_GT((wrong - force).cwiseAbs().maxCoeff(), 1e-9 * scale) << name;
   }

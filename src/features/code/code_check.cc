@@ -129,7 +129,7 @@ bool CodeReference::Find(TestState* state, std::string* why) {
     *why = "the actuators do not hold the coordinates";
     return false;
   }
-  state->forces = qr.solve(state->along + state->more);
+  state->forces = qr.solve(VecX(state->along + state->more));
   return true;
 }
 

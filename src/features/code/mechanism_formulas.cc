@@ -704,7 +704,7 @@ class FormulaMaker {
           if (loops.rows() > 0) {  // Eigen decomposes nothing that is empty
             Eigen::CompleteOrthogonalDecomposition<MatX> solver(loops);
             solver.setThreshold(1e-9);
-            step -= solver.solve(loops * step + open);
+            step -= solver.solve(VecX(loops * step + open));
           }
           Step(scale.asDiagonal() * step, &x);
         }

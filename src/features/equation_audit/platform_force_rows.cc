@@ -123,7 +123,7 @@ void LimbSystemRows(const Case& c, std::vector<AuditRow>* rows) {
       rank.Add(30, RankOf(printed), RankOf(corrected));
       auto misfit = [](const sp::LimbSystem& s) {
         const MatX A = s.matrix;
-        const VecX x = A.completeOrthogonalDecomposition().solve(s.right_side);
+        const VecX x = A.completeOrthogonalDecomposition().solve(VecX(s.right_side));
         return (A * x - s.right_side).cwiseAbs().maxCoeff();
       };
       const double size = corrected.right_side.cwiseAbs().maxCoeff();

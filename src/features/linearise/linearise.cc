@@ -249,7 +249,8 @@ class Lineariser {
     if (!forces_given_) {
       // The forces of least norm that balance f best, in units of their own.
       const MatX scaled = unit_.asDiagonal() * rates.transpose();
-      out_.drive_force = scaled.completeOrthogonalDecomposition().solve(unit_.asDiagonal() * f);
+      out_.drive_force =
+          scaled.completeOrthogonalDecomposition().solve(VecX(unit_.asDiagonal() * f));
     }
     const VecX rest = rates.transpose() * out_.drive_force - f;
     ForceDerivatives slopes;
@@ -371,7 +372,7 @@ class Lineariser {
       }
       const MatX scaled = unit_.asDiagonal() * StiffnessOf(slopes) * unit_.asDiagonal();
       const VecX step =
-          unit_.asDiagonal() * scaled.colPivHouseholderQr().solve(unit_.asDiagonal() * rest);
+          unit_.asDiagonal() * scaled.colPivHouseholderQr().solve(VecX(unit_.asDiagonal() * rest));
       double share = 1.0;
       bool better = false;
       for (; share > 1e-6 && !better; share *= 0.5) {

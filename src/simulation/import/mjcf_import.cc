@@ -848,8 +848,7 @@ void WarnWhatIsLost(MjcfImport* in) {
                         in->carried.size() == 1 ? "a free joint" : "free joints"));
   }
   WarnNames(*in, "positions of these joints count from the file's reference (ref): ", in->shifted);
-  WarnNames(*in, "zero is beyond the range of these joints, the loops are closed from inside it: ",
-            in->moved);
+  WarnNames(*in, "zero is beyond the range of these joints, home is inside it: ", in->moved);
   if (in->touching && !in->ContactsAreOff()) {
     const std::string contact = TouchingGeoms(*in);
     if (contact.empty()) {
