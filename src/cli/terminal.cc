@@ -64,6 +64,11 @@ void SayText(std::FILE* to, std::string_view text) {
 
 void FindingPrinter::Print(const Diagnostics& diagnostics) {
   for (const Finding& finding : diagnostics.findings()) {
+    if (finding.severity == Severity::kWarning && messages_.contains(finding.message) &&
+        made_.contains(std::filesystem::path(finding.file).lexically_normal())) {
+      continue;
+    }
+    messages_.insert({finding.message, "left_out: " + finding.message});
     const std::string text = ToText(finding);
     if (reported_.insert(text).second) SayText(to_, text + "\n");
   }

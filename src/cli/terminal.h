@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <set>
 #include <string>
 #include <string_view>
@@ -37,10 +38,13 @@ class FindingPrinter {
  public:
   explicit FindingPrinter(std::FILE* to) : to_(to) {}
   void Print(const Diagnostics& diagnostics);
+  /// `model` was made of files whose findings are printed: their warnings are not repeated for it.
+  void AddMadeModel(const std::filesystem::path& model) { made_.insert(model.lexically_normal()); }
 
  private:
   std::FILE* to_;
-  std::set<std::string> reported_;
+  std::set<std::string> reported_, messages_;
+  std::set<std::filesystem::path> made_;
 };
 
 /// One line on stderr that rewrites itself, with the time left; does nothing unless stderr is a

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/run_program.h"
@@ -120,6 +121,33 @@ TEST_F(CliTest, UrdfIsCompletedByTheFileBesideIt) {
     EXPECT_EQ(mbverify("model " + model + " --format urdf --out " + urdf).exit_code, 2);
     EXPECT_FALSE(fs::exists(urdf));
     EXPECT_EQ(ReadAll(companion), "shopping: list\n");
+  }
+}
+
+// What a robot's file was warned of is not repeated for the model that is made of it; what is wrong
+// with a model that was changed by hand is.
+TEST_F(CliTest, ARobotsWarningsAreGivenOnce) {
+  fs::create_directories(mbverify.folder());
+  const std::string robot = (mbverify.folder() / "arm.xml").string();
+  std::ofstream(robot) << R"(<mujoco model="arm"><worldbody>
+    <body name="trunk"><freejoint/><geom size="0.1"/>
+      <body name="arm"><joint name="elbow" axis="0 1 0" armature="500"/><geom size="0.1" pos="0.3 0 0"/>
+    </body></body></worldbody><actuator><motor joint="elbow"/></actuator></mujoco>)";
+  const auto times = [](const std::string& text, const std::string& what) {
+    size_t count = 0;
+    for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
+      ++count;
+    return count;
+  };
+  const ProgramResult first = mbverify(RunArguments(mbverify, robot) + " --no-own-file");
+  EXPECT_EQ(first.exit_code, 0) << first.err;
+  for (const char* warned : {"behind its gear", "the free joint of trunk"}) {
+    EXPECT_EQ(times(first.err, warned), 1U) << first.err;
+  }
+  const ProgramResult again = mbverify(RunArguments(
+      mbverify, (mbverify.folder() / mbverify.Out()).string() + "/arm/setup/first.yaml"));
+  for (const char* warned : {"behind its gear", "the free joint of trunk"}) {
+    EXPECT_EQ(times(again.err, warned), 1U) << again.err;
   }
 }
 

@@ -38,7 +38,7 @@ struct SlipSearch {
   std::vector<std::string> arguments = {};  ///< that are known of the state
   /// What an edited file gives; at a few states first (`few`), else at all. Empty where it fails.
   std::function<std::optional<AuditValues>(const std::string& text, bool few)> evaluate = {};
-  size_t few = 3;  ///< states of it
+  size_t few = 1;  ///< states of it
 };
 
 struct Slip {

@@ -181,6 +181,7 @@ bool SetUpRobot(const std::string& robot, const RunArguments& arguments, Finding
       return false;
     }
   }
+  findings->AddMadeModel(model);
   if (!arguments.quiet) {
     const std::string model = CompletedModel(robot);
     Say(stderr, "{}{} is run by {}; go on from there\n", robot,

@@ -15,29 +15,30 @@ import unittest
 FOLDER = pathlib.Path(os.environ["MBV_SOURCE"]) / "docs" / "how-to" / "notebooks"
 
 
-def execute(notebook, folder):
-    """The notebook run in `folder`, or what it complains of."""
-    copy = pathlib.Path(folder) / notebook.name
-    shutil.copy(notebook, copy)
+def execute(notebooks, folder):
+    """The notebooks run in `folder` by one process, or what it complains of."""
+    copies = [pathlib.Path(shutil.copy(notebook, folder)) for notebook in notebooks]
     done = subprocess.run(
         [
             sys.executable, "-m", "nbconvert", "--to", "notebook", "--inplace", "--execute",
             "--ExecutePreprocessor.timeout=120", "--ClearMetadataPreprocessor.enabled=True",
-            "--ClearMetadataPreprocessor.clear_notebook_metadata=False", str(copy),
+            "--ClearMetadataPreprocessor.clear_notebook_metadata=False", *map(str, copies),
         ],
         cwd=folder, capture_output=True, text=True, check=False,
     )
-    return copy.read_text() if done.returncode == 0 else None, done.stderr
+    texts = [copy.read_text() for copy in copies] if done.returncode == 0 else None
+    return texts, done.stderr
 
 
 class Notebooks(unittest.TestCase):
     def test_run(self):
         notebooks = sorted(FOLDER.glob("*.ipynb"))
         self.assertGreaterEqual(len(notebooks), 8)
-        for notebook in notebooks:
-            with self.subTest(notebook.name), tempfile.TemporaryDirectory() as folder:
-                text, complaint = execute(notebook, folder)
-                self.assertIsNotNone(text, complaint[-2000:])
+        with tempfile.TemporaryDirectory() as folder:
+            texts, complaint = execute(notebooks, folder)
+        self.assertIsNotNone(texts, complaint[-2000:])
+        for notebook, text in zip(notebooks, texts, strict=True):
+            with self.subTest(notebook.name):
                 if os.environ.get("MBV_UPDATE_GOLDEN"):
                     notebook.write_text(text)
                 shown = json.loads(notebook.read_text())["cells"]
@@ -60,8 +61,8 @@ class Notebooks(unittest.TestCase):
                  "nbformat_minor": 5}
             ))
             with tempfile.TemporaryDirectory() as elsewhere:
-                text, complaint = execute(notebook, elsewhere)
-        self.assertIsNone(text)
+                texts, complaint = execute([notebook], elsewhere)
+        self.assertIsNone(texts)
         self.assertIn("AssertionError", complaint)
 
 

@@ -364,7 +364,7 @@ class Commands(unittest.TestCase):
             "friction_five_bar",
             ["x", "y"],
             {"upper_mm": (230, 260)},
-            evaluations=16,
+            evaluations=8,
             resolution=60,
             jobs=2,
         )
