@@ -442,6 +442,7 @@ double SizeOf(const SpringLaw& law, const Rates& rates, const MotionSize& motion
 }
 // By the energy that springs have and by how far beyond its ends the motion may come.
 double SizeOf(const StopLaw& law, const Rates& rates, const MotionSize& motion) {
+  if (law.rigid()) return 0.0;
   const double way = rates.velocity * motion.duration_s;
   const double deepest =
       std::max({0.0, rates.home + way - law.upper, law.lower - (rates.home - way)});
@@ -460,6 +461,25 @@ double SizeOf(const CurveLaw& law, const Rates& rates, const MotionSize& motion)
   for (auto knot = first == knots.begin() ? first : first - 1; knot != knots.end() && knot <= last;
        ++knot) {
     largest = std::max(largest, std::abs(knot->force));
+  }
+  return largest;
+}
+double SizeOf(const CurvesLaw& law, const Rates& rates, const MotionSize& motion) {
+  double largest = 0.0;
+  for (const CurveLaw& curve : law.curves) {
+    largest = std::max(largest, SizeOf(curve, rates, motion));
+  }
+  return largest;
+}
+// At home, at the ends of the way and halfway, standing and both ways at full speed.
+double SizeOf(const ExpressionLaw& law, const Rates& rates, const MotionSize& motion) {
+  const double way = rates.velocity * motion.duration_s;
+  double largest = 0.0;
+  for (const double share : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+    for (const double v : {-rates.velocity, 0.0, rates.velocity}) {
+      const double force = std::abs(law.force(rates.home + share * way, v));
+      if (std::isfinite(force)) largest = std::max(largest, force);
+    }
   }
   return largest;
 }

@@ -202,6 +202,7 @@ class Writer {
                  {"exponent", law.exponent},
                  {"damping", law.damping},
                  {"dissipation", law.dissipation}};
+    if (law.rigid()) json = {{"restitution", law.restitution}};
     if (std::isfinite(law.lower)) json["lower"] = law.lower;
     if (std::isfinite(law.upper)) json["upper"] = law.upper;
     return json;
@@ -216,6 +217,14 @@ class Writer {
     }
     return {{"of", law.of_rate ? "rate" : "position"}, {"knots", std::move(knots)}};
   }
+  [[nodiscard]] Json LawJson(const CurvesLaw& law) const {
+    Json curves = Json::array();
+    for (size_t i = 0; i < law.curves.size(); ++i) {
+      curves.push_back({{"rate", law.rates[i]}, {"knots", LawJson(law.curves[i])["knots"]}});
+    }
+    return {{"of", "both"}, {"held", law.held}, {"curves", std::move(curves)}};
+  }
+  [[nodiscard]] Json LawJson(const ExpressionLaw& law) const { return {{"force", law.text}}; }
   [[nodiscard]] Json LawJson(const FrictionLaw& law) const {
     Json json = {{"coulomb", law.coulomb},
                  {"breakaway", law.breakaway},

@@ -173,18 +173,42 @@ LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,
   return at;
 }
 
-RunSummary CheckLoadsAt(const Mechanism& mechanism, const BodyStates& states,
-                        const std::vector<LoadSample>& samples) {
+double ForceAtStates(const Mechanism& mechanism, const BodyStates& states, const DriveForce& force,
+                     double t_s) {
+  const double given = Evaluate(force.force, t_s).value;
+  if (!force.following) return given;
+  return given + force.following->value(t_s, InputsOf(mechanism, states, *force.following));
+}
+
+RunSummary CheckForcesAt(const Mechanism& mechanism, const BodyStates& states, double t_s,
+                         const std::vector<LoadSample>& samples,
+                         const std::vector<DriveForce>& forces) {
+  RunSummary summary = RunSummary::Done();
+  const auto check = [&](const StateFunction& function, double at_s, const auto& path) {
+    const std::vector<double> inputs = InputsOf(mechanism, states, function);
+    const double value = function.value(at_s, inputs);
+    if (!summary.ok() || std::isfinite(value)) return;
+    summary = HasNoValue(mechanism, path(), function, at_s, inputs, value);
+  };
   for (const LoadSample& sample : samples) {
     if (sample.load == nullptr) continue;
     for (const Load::Following& part : sample.load->following) {
-      const std::vector<double> inputs = InputsOf(mechanism, states, part.function);
-      const double value = part.function.value(sample.time_s, inputs);
-      if (std::isfinite(value)) continue;
-      return LoadHasNoValue(mechanism, *sample.load, part, sample.time_s, inputs, value);
+      check(part.function, sample.time_s, [&] { return PathOf(*sample.load, part); });
     }
   }
-  return RunSummary::Done();
+  for (const DriveForce& force : forces) {
+    if (force.following) check(*force.following, t_s, [&] { return PathOf(mechanism, force); });
+  }
+  for (size_t e = 0; e < mechanism.elements.size() && summary.ok(); ++e) {
+    const auto* law = std::get_if<ExpressionLaw>(&mechanism.elements[e].law);
+    if (law == nullptr) continue;
+    const ScalarRow row = ElementRow(mechanism, e, states);
+    const double rate = RateOf(row, states.V_WB), value = law->force(row.value, rate);
+    if (!std::isfinite(value)) {
+      summary = HasNoValue(mechanism.elements[e], t_s, row.value, rate, value);
+    }
+  }
+  return summary;
 }
 
 }  // namespace mbv

@@ -63,9 +63,14 @@ void PredictAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>&
 [[nodiscard]] LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,
                                   const LoadSample& sample);
 
-/// Names the first load that is not finite at the states.
-[[nodiscard]] RunSummary CheckLoadsAt(const Mechanism& mechanism, const BodyStates& states,
-                                      const std::vector<LoadSample>& samples);
+/// What a drive is given at the states [N or N m].
+[[nodiscard]] double ForceAtStates(const Mechanism& mechanism, const BodyStates& states,
+                                   const DriveForce& force, double t_s);
+
+/// Names the first load, given drive force or element that is not finite at the states.
+[[nodiscard]] RunSummary CheckForcesAt(const Mechanism& mechanism, const BodyStates& states,
+                                       double t_s, const std::vector<LoadSample>& samples,
+                                       const std::vector<DriveForce>& forces = {});
 
 }  // namespace mbv
 

@@ -109,7 +109,9 @@ enum class Happening {
   kSlidesUp,     ///< towards larger values of its coordinate
   kSlidesDown,   ///< towards smaller ones
   kSwitchedOff,  ///< a brake, a clutch
-  kFree,         ///< a stop
+  kHitsUpper,    ///< a rigid stop: rates jump
+  kHitsLower,
+  kFree,  ///< a stop
   kUpperEnd,
   kLowerEnd,
   kKnot  ///< a curve, beyond one of its corners
@@ -120,7 +122,7 @@ struct MotionEvent {
   Happening what = Happening::kRests;
 
   /// True where accelerations jump.
-  [[nodiscard]] bool jumps() const { return what <= Happening::kSwitchedOff; }
+  [[nodiscard]] bool jumps() const { return what <= Happening::kHitsLower; }
 };
 
 [[nodiscard]] const char* ToText(Happening what);

@@ -19,6 +19,10 @@ class EventLog {
  public:
   /// `piece` distinguishes what a curve does on both sides of a knot.
   void Note(const ForceElement& element, double time_s, Happening now, int piece = 0);
+  /// What happens at one instant only.
+  void Add(const ForceElement& element, double time_s, Happening what) {
+    events_.push_back({.time_s = time_s, .element = element.name, .what = what});
+  }
   /// In the order of their times.
   [[nodiscard]] const std::vector<MotionEvent>& events() const { return events_; }
 

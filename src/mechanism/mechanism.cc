@@ -133,7 +133,7 @@ const char* WordOf(Contact::Kind kind) {
 
 const char* WordOf(const ForceElement& element) {
   static constexpr std::array<const char*, std::variant_size_v<decltype(element.law)>> kWords = {
-      "damping", "spring", "rotor", "friction", "stop", "curve"};
+      "damping", "spring", "rotor", "friction", "stop", "curve", "curve", "expression"};
   return kWords.at(element.law.index());
 }
 
@@ -196,6 +196,23 @@ int PieceOf(const CurveLaw& law, double q, double v) {
   return static_cast<int>(std::ranges::count_if(
       law.knots, [x](const CurveLaw::Knot& knot) { return IsCorner(knot) && knot.at < x; }));
 }
+// Corners lie at rates, and where one of the curves has one.
+int PieceOf(const CurvesLaw& law, double q, double v) {
+  const auto knots = static_cast<int>(law.curves.front().knots.size());
+  int before = 0;
+  for (int k = 0; k < knots; ++k) {
+    const auto is_corner = [k](const CurveLaw& curve) {
+      return IsCorner(curve.knots[static_cast<size_t>(k)]);
+    };
+    const double at = law.curves.front().knots[static_cast<size_t>(k)].at;
+    before += at < q && std::ranges::any_of(law.curves, is_corner) ? 1 : 0;
+  }
+  const auto slower = std::ranges::count_if(law.rates, [v](double rate) { return rate < v; });
+  const int strip =
+      law.held ? static_cast<int>(slower)
+               : std::clamp(static_cast<int>(slower), 1, static_cast<int>(law.rates.size()) - 1);
+  return strip * (knots + 1) + before;
+}
 template <typename Law>
 int PieceOf(const Law& /*law*/, double /*q*/, double /*v*/) {
   return 0;
@@ -211,7 +228,13 @@ bool HasCorners(const ForceElement& element) {
   if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
     return std::ranges::any_of(curve->knots, IsCorner);
   }
-  return std::holds_alternative<StopLaw>(element.law);
+  return std::holds_alternative<StopLaw>(element.law) ||
+         std::holds_alternative<CurvesLaw>(element.law);
+}
+
+bool IsRigidStop(const ForceElement& element) {
+  const auto* stop = std::get_if<StopLaw>(&element.law);
+  return stop != nullptr && stop->rigid();
 }
 
 std::string FirstFriction(const Mechanism& mechanism) {

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -402,6 +404,11 @@ struct StopLaw {
   double exponent = 1.0;                                   ///< n, >= 1
   double damping = 0.0;                                    ///< c [N s/m or N m s/rad], >= 0
   double dissipation = 0.0;                                ///< a [s/m or s/rad], >= 0
+  /// ε of a rigid stop, 0 … 1: it exerts no force, and what meets it with the rate q̇ has −ε q̇
+  /// afterwards. NaN: elastic.
+  double restitution = kNan;
+
+  [[nodiscard]] bool rigid() const { return !std::isnan(restitution); }
 };
 
 /// A characteristic curve: force over the coordinate or over its rate, continuous, cubic between
@@ -413,6 +420,19 @@ struct CurveLaw {
   };
   bool of_rate = false;     ///< over the rate, else over the coordinate
   std::vector<Knot> knots;  ///< at least two, `at` increasing
+};
+
+/// Curves over the coordinate at several rates: force over both, straight from rate to rate.
+struct CurvesLaw {
+  std::vector<double> rates;     ///< at least two, increasing [m/s or rad/s]
+  std::vector<CurveLaw> curves;  ///< one per rate, over the coordinate, with knots at equal places
+  bool held = false;             ///< beyond the first and the last rate; else straight on
+};
+
+/// A force that an expression gives, positive as a drive's.
+struct ExpressionLaw {
+  std::string text;  ///< of x, the coordinate, and v, its rate, with the values of parameters
+  std::function<double(double position, double rate)> force;
 };
 
 /// Frames F on the parent and M on the child that a bushing joins. Its six coordinates are the
@@ -465,7 +485,9 @@ struct ForceElement {
   int drive = -1;                  ///< … the distance drive, or …
   int bushing = -1;                ///< … `coordinate` of this one, or …
   int spring = -1;                 ///< … the length of this one
-  std::variant<DampingLaw, SpringLaw, RotorLaw, FrictionLaw, StopLaw, CurveLaw> law;
+  std::variant<DampingLaw, SpringLaw, RotorLaw, FrictionLaw, StopLaw, CurveLaw, CurvesLaw,
+               ExpressionLaw>
+      law;
 };
 
 /// What becomes of bodies in a robot's file that nothing ties to the world.
@@ -570,6 +592,8 @@ void AddOfBall(const ForceElement& element, JointKind kind, std::vector<ForceEle
 [[nodiscard]] bool IsGyroscopic(const ForceElement& element);
 /// "kx", "krz", "cry": what an element of a bushing is.
 [[nodiscard]] std::string BushingWord(const ForceElement& element);
+/// True for a stop that exerts impulses and no elastic force.
+[[nodiscard]] bool IsRigidStop(const ForceElement& element);
 /// True for dry friction that is not zero.
 [[nodiscard]] bool HasFriction(const ForceElement& element);
 /// Name of the first element with dry friction, or "".

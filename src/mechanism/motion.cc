@@ -307,16 +307,20 @@ std::string NameOf(const Mechanism& mechanism, const Coordinate& coordinate) {
 
 std::vector<FollowedAngle> FollowedAngles(const Mechanism& mechanism, const Motion& motion) {
   std::vector<FollowedAngle> angles;
-  for (const Load& load : motion.loads) {
-    for (const Load::Following& part : load.following) {
-      for (const StateFunction::Input& input : part.function.inputs) {
-        const Coordinate& at = input.coordinate;
-        const bool driven =
-            at.kind == Coordinate::Kind::kDrive || at.kind == Coordinate::Kind::kPrescribed;
-        if (driven || IsLength(mechanism, at)) continue;
-        angles.push_back({at, StartAngle(mechanism, motion, at)});
-      }
+  const auto add = [&](const StateFunction& function) {
+    for (const StateFunction::Input& input : function.inputs) {
+      const Coordinate& at = input.coordinate;
+      const bool driven =
+          at.kind == Coordinate::Kind::kDrive || at.kind == Coordinate::Kind::kPrescribed;
+      if (driven || IsLength(mechanism, at)) continue;
+      angles.push_back({at, StartAngle(mechanism, motion, at)});
     }
+  };
+  for (const Load& load : motion.loads) {
+    for (const Load::Following& part : load.following) add(part.function);
+  }
+  for (const DriveForce& force : motion.forces) {
+    if (force.following) add(*force.following);
   }
   return angles;
 }
@@ -332,24 +336,50 @@ double StartAngle(const Mechanism& mechanism, const Motion& motion, const Coordi
   return HomeValue(mechanism, coordinate);
 }
 
-RunSummary LoadHasNoValue(const Mechanism& mechanism, const Load& load, const Load::Following& part,
-                          double t_s, std::span<const double> inputs, double value) {
+std::string PathOf(const Load& load, const Load::Following& part) {
+  return fmt::format("loads.{}.{}[{}]", load.name, part.component < 3 ? "force" : "moment",
+                     part.component % 3);
+}
+std::string PathOf(const Mechanism& mechanism, const DriveForce& force) {
+  return "forces." + mechanism.drives[static_cast<size_t>(force.drive)].name;
+}
+
+namespace {
+
+// Without the inputs.
+RunSummary NoValue(const std::string& path, double t_s, double value) {
   RunSummary summary;
   summary.stop = Stop::kUnsupported;
   summary.time_s = t_s;
-  summary.where = fmt::format("loads.{}.{}[{}]", load.name, part.component < 3 ? "force" : "moment",
-                              part.component % 3);
-  summary.names_where = summary.states_time = true;
-  summary.message = fmt::format("the expression of {} is {} at t = {:.6g} s", summary.where,
-                                std::isnan(value) ? "not a number" : "infinite", t_s);
+  summary.where = path;
+  summary.names_where = true;
+  summary.states_time = !std::isnan(t_s);
+  summary.message = fmt::format("the expression of {} is {}", path,
+                                std::isnan(value) ? "not a number" : "infinite");
+  if (summary.states_time) summary.message += fmt::format(" at t = {:.6g} s", t_s);
+  return summary;
+}
+
+}  // namespace
+
+RunSummary HasNoValue(const ForceElement& element, double t_s, double position, double rate,
+                      double value) {
+  RunSummary summary = NoValue(element.name, t_s, value);
+  summary.message += fmt::format(", where x = {:.6g} and v = {:.6g}", position, rate);
+  return summary;
+}
+
+RunSummary HasNoValue(const Mechanism& mechanism, const std::string& path,
+                      const StateFunction& function, double t_s, std::span<const double> inputs,
+                      double value) {
+  RunSummary summary = NoValue(path, t_s, value);
   const auto same = [](const StateFunction::Input& a, const StateFunction::Input& b) {
     return a.rate == b.rate && a.coordinate == b.coordinate;
   };
   for (size_t i = 0; i < inputs.size(); ++i) {
-    const StateFunction::Input& input = part.function.inputs[i];
-    const auto first =
-        std::ranges::find_if(part.function.inputs,
-                             [&](const StateFunction::Input& other) { return same(input, other); });
+    const StateFunction::Input& input = function.inputs[i];
+    const auto first = std::ranges::find_if(
+        function.inputs, [&](const StateFunction::Input& other) { return same(input, other); });
     if (&*first != &input) continue;  // an expression may name a coordinate twice
     summary.message +=
         fmt::format("{}{}.{} = {:.6g} {}{}", i == 0 ? ", where " : ", ",

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -110,8 +111,9 @@ struct Load {
 
 /// A drive that exerts a given force instead of following a command.
 struct DriveForce {
-  int drive = 0;  ///< index into Mechanism::drives
-  Profile force;  ///< [N] or [N m]
+  int drive = 0;                                ///< index into Mechanism::drives
+  Profile force;                                ///< [N] or [N m]
+  std::optional<StateFunction> following = {};  ///< what it is in addition
 };
 
 /// A force element that acts with a share of its force: a brake or clutch that is switched. Or a
@@ -272,12 +274,12 @@ struct BodyStates {
 // joints from home, those of outputs from the command or start value that gives them; from there
 // all go on without a jump. Reference and simulation count each by itself.
 
-/// An angle of a joint or an output that some load follows.
+/// An angle of a joint or an output that some load or drive force follows.
 struct FollowedAngle {
   Coordinate coordinate;
   double start = 0.0;  ///< within half a rotation of it at t = 0 [rad]
 };
-/// Of all loads, in their order; drives and prescribed joints are not among them.
+/// Of all loads and drive forces, in their order; drives and prescribed joints are not among them.
 [[nodiscard]] std::vector<FollowedAngle> FollowedAngles(const Mechanism& mechanism,
                                                         const Motion& motion);
 
@@ -289,10 +291,16 @@ struct FollowedAngle {
 /// Its name in scenario files, without .position or .velocity: "motor", "tool.yaw", "hip.0".
 [[nodiscard]] std::string NameOf(const Mechanism& mechanism, const Coordinate& coordinate);
 
-/// How a run ends where a part of a load is `value`, which is not finite, at these inputs (as in
-/// its function) and time.
-[[nodiscard]] RunSummary LoadHasNoValue(const Mechanism& mechanism, const Load& load,
-                                        const Load::Following& part, double t_s,
-                                        std::span<const double> inputs, double value);
+/// "loads.drag.force[2]", "forces.motor".
+[[nodiscard]] std::string PathOf(const Load& load, const Load::Following& part);
+[[nodiscard]] std::string PathOf(const Mechanism& mechanism, const DriveForce& force);
+/// How a run ends where the function of a load or drive force at this path is `value`, which is not
+/// finite, at these inputs and time.
+[[nodiscard]] RunSummary HasNoValue(const Mechanism& mechanism, const std::string& path,
+                                    const StateFunction& function, double t_s,
+                                    std::span<const double> inputs, double value);
+/// The same of an element that is an expression.
+[[nodiscard]] RunSummary HasNoValue(const ForceElement& element, double t_s, double position,
+                                    double rate, double value);
 
 }  // namespace mbv

@@ -21,7 +21,8 @@ std::string TextOf(const SpringLaw& law) {
   return text;
 }
 std::string TextOf(const StopLaw& law) {
-  std::string text = fmt::format("stiffness: {}", law.stiffness);
+  std::string text = law.rigid() ? fmt::format("restitution: {}", law.restitution)
+                                 : fmt::format("stiffness: {}", law.stiffness);
   if (std::isfinite(law.lower)) text += fmt::format(", lower: {}", law.lower);
   if (std::isfinite(law.upper)) text += fmt::format(", upper: {}", law.upper);
   if (law.exponent != 1.0) text += fmt::format(", exponent: {}", law.exponent);
@@ -38,6 +39,25 @@ std::string TextOf(const CurveLaw& law) {
   return fmt::format("{}points: [{}], slopes: [{}]", law.of_rate ? "of: rate, " : "",
                      fmt::join(points, ", "), fmt::join(slopes, ", "));
 }
+std::string TextOf(const CurvesLaw& law) {
+  std::vector<std::string> points, slopes;
+  for (size_t k = 0; k < law.curves.front().knots.size(); ++k) {
+    std::string row = fmt::format("[{}", law.curves.front().knots[k].at);
+    for (const CurveLaw& curve : law.curves) row += fmt::format(", {}", curve.knots[k].force);
+    points.push_back(row + "]");
+  }
+  for (const CurveLaw& curve : law.curves) {
+    std::vector<std::string> pairs;
+    for (const CurveLaw::Knot& knot : curve.knots) {
+      pairs.push_back(fmt::format("[{}, {}]", knot.slope_before, knot.slope_after));
+    }
+    slopes.push_back(fmt::format("[{}]", fmt::join(pairs, ", ")));
+  }
+  return fmt::format("of: both, rates: [{}], points: [{}], slopes: [{}], beyond_rates: {}",
+                     fmt::join(law.rates, ", "), fmt::join(points, ", "), fmt::join(slopes, ", "),
+                     law.held ? "held" : "linear");
+}
+std::string TextOf(const ExpressionLaw& law) { return fmt::format("force: \"{}\"", law.text); }
 std::string TextOf(const RotorLaw& law) {
   return fmt::format("inertia: {}, ratio: {}", law.inertia, law.ratio);
 }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -13,8 +15,8 @@
 namespace mbv::internal {
 namespace {
 
-const std::vector<std::string> kKinds = {"damping", "spring", "rotor",  "friction",
-                                         "stop",    "curve",  "bushing"};
+const std::vector<std::string> kKinds = {"damping", "spring", "rotor",      "friction",
+                                         "stop",    "curve",  "expression", "bushing"};
 
 constexpr std::initializer_list<UnitSuffix> kSlopes = {kPlain, kPerMm, kPerDeg};
 
@@ -29,10 +31,11 @@ const std::vector<std::string>& KeysOf(const std::string& kind) {
       {"stop",
        {"lower", "lower_deg", "lower_mm", "upper", "upper_deg", "upper_mm", "stiffness",
         "stiffness_per_mm", "stiffness_per_deg", "exponent", "damping", "damping_per_mm",
-        "damping_per_deg", "dissipation"}},
+        "damping_per_deg", "dissipation", "restitution"}},
       {"curve",
        {"of", "points", "points_deg", "points_mm", "points_rpm", "interpolation", "beyond",
-        "slopes"}},
+        "slopes", "rates", "rates_rpm", "beyond_rates"}},
+      {"expression", {"force"}},
       {"bushing", {"parent", "child", "stiffness", "damping"}},
       {"friction",
        {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius", "radius_mm", "length",
@@ -67,7 +70,7 @@ void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
   }
   const YamlMap map(&yaml, entry.value.get(), JoinPath(section, entry.key), keys);
   if (!map.valid() || map.Required("kind") == nullptr) return;
-  if (!yaml.Choice(*kind, map.PathOf("kind"), kKinds)) return;
+  if (!ReadKind(*kind, map.PathOf("kind"), kKinds, &yaml)) return;
   if (kind->text == "bushing") return ReadBushing(block, map, block.prefix + entry.key);
   ForceElement element{.name = block.prefix + entry.key, .law = {}};
   const bool placed = ReadPlace(block, map, &element);
@@ -85,7 +88,8 @@ void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
 
 bool ElementReader::SuitsBall(const YamlMap& map, const YamlNode& kind) {
   YamlReader& yaml = values_.yaml();
-  if (kind.text == "spring" || kind.text == "stop" || kind.text == "curve") {
+  if (kind.text == "spring" || kind.text == "stop" || kind.text == "curve" ||
+      kind.text == "expression") {
     yaml.Error(kind,
                fmt::format("{}: a ball's rotation has no position for a {}", map.path(), kind.text),
                "kind: bushing, with the joint's frames and stiffness: [0, 0, 0, k, k, k]");
@@ -197,7 +201,12 @@ bool ElementReader::ReadLaw(const Block& block, const YamlMap& map, const std::s
   if (kind == "rotor") return take(ReadRotor(block, map, element));
   if (kind == "friction") return take(ReadFriction(block, map, element));
   if (kind == "stop") return take(ReadStop(block, map, element));
-  if (kind == "curve") return take(ReadCurve(block, map, element));
+  if (kind == "curve") {
+    const YamlNode* of = map.Find("of");
+    if (of != nullptr && of->text == "both") return take(ReadCurves(block, map, element));
+    return take(ReadCurve(block, map, element));
+  }
+  if (kind == "expression") return take(ReadExpression(block, map));
   return take(ReadSpring(block, map, element));
 }
 
@@ -258,6 +267,7 @@ std::optional<StopLaw> ElementReader::ReadStop(const Block& block, const YamlMap
                                         stop.lower, stop.upper));
     good = false;
   }
+  if (map.Has("restitution")) return ReadRigid(block, map, stop, good);
   const auto stiffness = Slope(block, map, "stiffness", element);
   if (stiffness && *stiffness == 0.0) {
     yaml.Error(*map.node(), fmt::format("{}: stiffness = 0 stops nothing", map.path()));
@@ -285,6 +295,26 @@ std::optional<StopLaw> ElementReader::ReadStop(const Block& block, const YamlMap
   stop.damping = *damping;
   stop.dissipation = *dissipation;
   return stop;
+}
+
+std::optional<StopLaw> ElementReader::ReadRigid(const Block& block, const YamlMap& map,
+                                                StopLaw stop, bool good) {
+  YamlReader& yaml = values_.yaml();
+  for (const char* key : {"stiffness", "damping", "exponent", "dissipation"}) {
+    if (map.FindInUnit(key, kSlopes).node == nullptr) continue;
+    yaml.Error(*map.node(), fmt::format("{} has both restitution and {}", map.path(), key),
+               "restitution: of a rigid stop, which exerts impulses; stiffness: of an elastic one");
+    good = false;
+  }
+  const auto restitution = values_.Number(block, map, "restitution", {kPlain});
+  if (!restitution) return std::nullopt;
+  if (!(*restitution >= 0.0 && *restitution <= 1.0)) {
+    yaml.Error(*map.Find("restitution"), fmt::format("{} = {} violates 0 <= restitution <= 1",
+                                                     map.PathOf("restitution"), *restitution));
+    return std::nullopt;
+  }
+  stop.restitution = *restitution;
+  return good ? std::optional(stop) : std::nullopt;
 }
 
 namespace {
@@ -325,8 +355,14 @@ std::optional<CurveLaw> ElementReader::ReadCurve(const Block& block, const YamlM
   YamlReader& yaml = values_.yaml();
   CurveLaw curve;
   bool good = true;
+  for (const char* key : {"rates", "rates_rpm", "beyond_rates"}) {
+    if (!map.Has(key)) continue;
+    yaml.Error(*map.Find(key), fmt::format("{} belongs to of: both", map.PathOf(key)),
+               "of: both, with a force for each rate in every point");
+    good = false;
+  }
   if (const YamlNode* of = map.Find("of")) {
-    const auto what = yaml.Choice(*of, map.PathOf("of"), {"position", "rate"});
+    const auto what = yaml.Choice(*of, map.PathOf("of"), {"position", "rate", "both"});
     good = what.has_value();
     curve.of_rate = what == 1;
   }
@@ -353,10 +389,21 @@ std::optional<CurveLaw> ElementReader::ReadCurve(const Block& block, const YamlM
 }
 
 // As stated, or by the interpolation, and what lies beyond the points.
-bool ElementReader::ReadSlopes(const Block& block, const YamlMap& map, CurveLaw* curve) {
+bool ElementReader::ReadSlopes(const Block& block, const YamlMap& map, CurveLaw* curve,
+                               int of_curves) {
   YamlReader& yaml = values_.yaml();
   std::vector<CurveLaw::Knot>& knots = curve->knots;
-  if (const YamlNode* node = map.Find("slopes")) {
+  if (const YamlNode* all = map.Find("slopes")) {
+    const YamlNode* node = all;
+    if (of_curves >= 0) {  // a list for each rate
+      const auto lists = yaml.Items(*all, map.PathOf("slopes"));
+      if (!lists) return false;
+      if (static_cast<size_t>(of_curves) >= lists->size()) {
+        yaml.Error(*all, map.PathOf("slopes") + ": one list of pairs per rate");
+        return false;
+      }
+      node = (*lists)[static_cast<size_t>(of_curves)];
+    }
     const auto slopes = values_.Pairs(block, *node, map.PathOf("slopes"), kPlain);
     if (!slopes) return false;
     if (slopes->size() == knots.size() && !map.Has("interpolation") && !map.Has("beyond")) {
@@ -388,6 +435,117 @@ bool ElementReader::ReadSlopes(const Block& block, const YamlMap& map, CurveLaw*
   knots.front().slope_before = straight ? knots.front().slope_after : 0.0;
   knots.back().slope_after = straight ? knots.back().slope_before : 0.0;
   return true;
+}
+
+// Rows of a place and its force at each rate.
+std::optional<CurvesLaw> ElementReader::ReadCurves(const Block& block, const YamlMap& map,
+                                                   const ForceElement* element) {
+  YamlReader& yaml = values_.yaml();
+  const bool turns = element != nullptr && !IsAlongLength(*element);
+  const auto rates = map.FindInUnit("rates", {kPlain, kRpm});
+  const auto points = map.FindInUnit("points", {kPlain, kDeg, kMm});
+  if (rates.node == nullptr) (void)map.Required("rates");
+  if (points.node == nullptr) (void)map.Required("points");
+  const YamlNode* beyond = map.Required("beyond_rates");
+  const auto held = beyond == nullptr
+                        ? std::optional<int>()
+                        : yaml.Choice(*beyond, map.PathOf("beyond_rates"), {"linear", "held"});
+  if (rates.node == nullptr || points.node == nullptr || !held) return std::nullopt;
+  CurvesLaw law{.rates = {}, .curves = {}, .held = *held == 1};
+  bool good = true;
+  const auto refuse = [&](const YamlNode& node, const std::string& text, const char* hint = "") {
+    yaml.Error(node, text, hint);
+    good = false;
+  };
+  const auto suits = [&](const YamlMap::InUnit& found, bool fits, const char* what) {
+    if (element == nullptr || fits) return;
+    refuse(*found.node, fmt::format("{}: the {} of '{}' is not in that unit", map.PathOf(found.key),
+                                    what, NameOf(*element)));
+  };
+  suits(rates, rates.unit.suffix != kRpm.suffix || turns, "rate");
+  suits(points, points.unit.Suits(turns ? "rad" : "m"), "coordinate");
+  const std::string rates_path = map.PathOf(rates.key), path = map.PathOf(points.key);
+  const auto speeds = yaml.Items(*rates.node, rates_path);
+  const auto rows = yaml.Items(*points.node, path);
+  if (!speeds || !rows) return std::nullopt;
+  for (size_t i = 0; i < speeds->size(); ++i) {
+    const auto rate =
+        values_.Number(block, *(*speeds)[i], fmt::format("{}[{}]", rates_path, i), rates.unit);
+    if (!rate) return std::nullopt;
+    if (!law.rates.empty() && *rate <= law.rates.back()) {
+      refuse(*(*speeds)[i], fmt::format("{}[{}]: rates must increase", rates_path, i));
+    }
+    law.rates.push_back(*rate);
+  }
+  if (law.rates.size() < 2) {
+    refuse(*rates.node, rates_path + " has fewer than two rates",
+           "a curve that is the same at any rate has no `of`");
+  }
+  if (rows->size() < 2) refuse(*points.node, path + " has fewer than two points");
+  law.curves.resize(law.rates.size());
+  for (size_t k = 0; k < rows->size() && good; ++k) {
+    const std::string row_path = fmt::format("{}[{}]", path, k);
+    const auto row = yaml.Items(*(*rows)[k], row_path, static_cast<int>(law.rates.size()) + 1);
+    if (!row) return std::nullopt;
+    const auto at = values_.Number(block, *(*row)[0], row_path + "[0]", points.unit);
+    if (!at) return std::nullopt;
+    if (k > 0 && *at <= law.curves[0].knots.back().at) {
+      refuse(*(*row)[0], row_path + ": the first numbers must increase");
+    }
+    for (size_t i = 0; i < law.rates.size(); ++i) {
+      const auto force =
+          values_.Number(block, *(*row)[i + 1], fmt::format("{}[{}]", row_path, i + 1));
+      if (!force) return std::nullopt;
+      law.curves[i].knots.push_back({.at = *at, .force = *force});
+    }
+  }
+  if (!good) return std::nullopt;
+  for (size_t i = 0; i < law.rates.size(); ++i) {
+    if (!ReadSlopes(block, map, &law.curves[i], static_cast<int>(i))) return std::nullopt;
+  }
+  return law;
+}
+
+// Names of parameters are replaced by their values, so that the text means the same elsewhere.
+std::optional<ExpressionLaw> ElementReader::ReadExpression(const Block& block, const YamlMap& map) {
+  YamlReader& yaml = values_.yaml();
+  const YamlNode* node = map.Required("force");
+  if (node == nullptr) return std::nullopt;
+  const std::string path = map.PathOf("force");
+  const auto text = yaml.Text(*node, path);
+  if (!text) return std::nullopt;
+  for (const char* name : {"x", "v"}) {
+    const std::vector<std::string> parameters = block.scope->Names();
+    if (std::ranges::find(parameters, name) == parameters.end()) continue;
+    yaml.Error(*node,
+               fmt::format("{}: {} is the {} here, and a parameter of the model", path, name,
+                           *name == 'x' ? "coordinate" : "rate"),
+               "give the parameter another name");
+    return std::nullopt;
+  }
+  const FormulaResult compiled = block.scope->Compile(*text, {"x", "v"});
+  if (compiled.formula == nullptr) {
+    yaml.Error(*node, fmt::format("{} = '{}' {}", path, *text, compiled.error), compiled.hint);
+    return std::nullopt;
+  }
+  const auto is_word = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.';
+  };
+  ExpressionLaw law{.text = {}, .force = [formula = compiled.formula](double x, double v) {
+                      return formula->At(std::array{x, v});
+                    }};
+  for (size_t i = 0; i < text->size();) {
+    size_t end = i;
+    while (end < text->size() && is_word((*text)[end])) ++end;
+    if (end == i) ++end;
+    const std::string piece = text->substr(i, end - i);
+    const std::vector<std::string> parameters = block.scope->Names();
+    const bool known = std::ranges::find(parameters, piece) != parameters.end();
+    const auto value = known ? block.scope->Lookup(piece).value : std::nullopt;
+    law.text += value ? fmt::format("({})", *value) : piece;
+    i = end;
+  }
+  return law;
 }
 
 std::optional<SpringLaw> ElementReader::ReadSpring(const Block& block, const YamlMap& map,

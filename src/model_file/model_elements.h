@@ -56,7 +56,12 @@ class ElementReader {
                                   const ForceElement* element);
   std::optional<CurveLaw> ReadCurve(const Block& block, const YamlMap& map,
                                     const ForceElement* element);
-  bool ReadSlopes(const Block& block, const YamlMap& map, CurveLaw* curve);
+  std::optional<StopLaw> ReadRigid(const Block& block, const YamlMap& map, StopLaw stop, bool good);
+  std::optional<CurvesLaw> ReadCurves(const Block& block, const YamlMap& map,
+                                      const ForceElement* element);
+  std::optional<ExpressionLaw> ReadExpression(const Block& block, const YamlMap& map);
+  /// `of_curves`: which of several curves, or -1.
+  bool ReadSlopes(const Block& block, const YamlMap& map, CurveLaw* curve, int of_curves = -1);
   std::optional<double> Slope(const Block& block, const YamlMap& map, const std::string& key,
                               const ForceElement* element);
   [[nodiscard]] bool IsAlongLength(const ForceElement& element) const;

@@ -111,7 +111,7 @@ void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   const YamlNode* kind = map.Required("kind");
   const YamlNode* parent = map.Required("parent");
   const YamlNode* child = map.Required("child");
-  const auto choice = kind ? yaml.Choice(*kind, map.PathOf("kind"), KindWords()) : std::nullopt;
+  const auto choice = kind ? ReadKind(*kind, map.PathOf("kind"), KindWords(), &yaml) : std::nullopt;
   const auto on_parent = parent ? names_.Frame(block, *parent, map.PathOf("parent")) : std::nullopt;
   const auto on_child = child ? names_.Frame(block, *child, map.PathOf("child")) : std::nullopt;
   bool good = choice && on_parent && on_child;
@@ -398,6 +398,37 @@ bool CouplingReader::IsNew(const Coupling& coupling, const Coupling::Term& term,
     return false;
   }
   return true;
+}
+
+std::optional<int> ReadKind(const YamlNode& kind, const std::string& path,
+                            const std::vector<std::string>& words, YamlReader* yaml) {
+  struct Inexpressible {
+    const char* what;
+    const char* hint;
+    std::vector<std::string> words;
+  };
+  static const std::vector<Inexpressible> rows = {
+      {"rolling without slip constrains velocities alone, and constraints here are those of "
+       "positions",
+       "a wheel that rolls along a line is a coupling of its angle with the way: couplings: {NAME: "
+       "{joint: way, follows: wheel, ratio: radius}}",
+       {"rolling", "rolling_wheel", "wheel", "roll"}},
+      {"a cable that goes slack is no joint",
+       "elements: {kind: curve, from: A, to: B, points: [[0, 0], [L, 0], [L + 1, -k]], "
+       "interpolation: linear, beyond: linear} pulls beyond the length L only",
+       {"cable", "rope", "wire", "slack_cable", "pulley"}},
+      {"a belt that slips is no coupling",
+       "a shaft behind a second revolute joint with friction slips on it: elements: {kind: "
+       "friction, "
+       "joint: slip, coulomb: M}; without slip: couplings",
+       {"belt", "v_belt", "vbelt"}}};
+  for (const Inexpressible& row : rows) {
+    if (std::ranges::find(row.words, kind.text) == row.words.end()) continue;
+    yaml->Error(kind, fmt::format("{} = {} is not expressible: {}", path, kind.text, row.what),
+                row.hint);
+    return std::nullopt;
+  }
+  return yaml->Choice(kind, path, words);
 }
 
 }  // namespace mbv::internal

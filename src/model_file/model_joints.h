@@ -54,6 +54,11 @@ class JointReader {
   ModelJoints& joints_;
 };
 
+/// The choice that a `kind` makes; what people also look for there, and models cannot express, is a
+/// finding that says so.
+[[nodiscard]] std::optional<int> ReadKind(const YamlNode& kind, const std::string& path,
+                                          const std::vector<std::string>& words, YamlReader* yaml);
+
 /// Reads the coordinates from which home is searched: a number, or one per DOF.
 void ReadGuess(const Block& block, const YamlNode& node, const std::string& path,
                const UnitSuffix& unit, ModelValues* values, Joint* joint);

@@ -97,6 +97,24 @@ ForceAndSlope Vary(const CurveLaw& law, const Varying& at) {
   return {a.force + u * (a.slope_after + u * (c2 + w * c3)),
           (a.slope_after + 2.0 * u * c2 + u * (2.0 * w + u) * c3) * dx};
 }
+// As a polynomial in both: c + d t with c and d along the two curves around the rate.
+ForceAndSlope Vary(const CurvesLaw& law, const Varying& at) {
+  size_t upper = 1;
+  while (upper + 1 < law.rates.size() && at.rate >= law.rates[upper]) ++upper;
+  const double low = law.rates[upper - 1], high = law.rates[upper];
+  const ForceAndSlope c = Vary(law.curves[upper - 1], at), b = Vary(law.curves[upper], at);
+  if (law.held && at.rate <= low) return c;
+  if (law.held && at.rate >= high) return b;
+  const double t = (at.rate - low) / (high - low), dt = at.d_rate / (high - low);
+  return {c.force + (b.force - c.force) * t,
+          c.slope + (b.slope - c.slope) * t + (b.force - c.force) * dt};
+}
+ForceAndSlope Vary(const ExpressionLaw& law, const Varying& at) {
+  constexpr double kReach = 0.1;  // of the differences [m or rad, per second]
+  const double by_x = SlopeAt([&](double x) { return law.force(x, at.rate); }, at.position, kReach);
+  const double by_v = SlopeAt([&](double v) { return law.force(at.position, v); }, at.rate, kReach);
+  return {law.force(at.position, at.rate), by_x * at.d_position + by_v * at.d_rate};
+}
 ForceAndSlope Vary(const FrictionLaw& law, const Varying& at) {
   const double sense = law.sense(at.sign);
   if (at.sign == 0) return {-sense * law.breakaway, 0.0};

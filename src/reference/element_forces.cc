@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/ridders.h"
+
 namespace mbv::internal {
 namespace {
 
@@ -110,6 +112,27 @@ double IntegralTo(const CurveLaw& law, double x) {
 double ForceOf(const CurveLaw& law, const AlongElement& at) {
   return at.engaged * CurveAt(law, law.of_rate ? at.rate : at.position).force;
 }
+// Between the curves of two rates, with its slopes over both.
+struct BetweenCurves {
+  double force = 0.0, over_position = 0.0, over_rate = 0.0;
+};
+BetweenCurves AtRate(const CurvesLaw& law, double position, double rate) {
+  const auto next = std::upper_bound(law.rates.begin() + 1, law.rates.end() - 1, rate);
+  const auto i = static_cast<size_t>(next - law.rates.begin());
+  const double h = law.rates[i] - law.rates[i - 1];
+  const double share = (rate - law.rates[i - 1]) / h,
+               t = law.held ? std::clamp(share, 0.0, 1.0) : share;
+  const OnCurve a = CurveAt(law.curves[i - 1], position), b = CurveAt(law.curves[i], position);
+  return {.force = (1.0 - t) * a.force + t * b.force,
+          .over_position = (1.0 - t) * a.slope + t * b.slope,
+          .over_rate = t == share ? (b.force - a.force) / h : 0.0};
+}
+double ForceOf(const CurvesLaw& law, const AlongElement& at) {
+  return at.engaged * AtRate(law, at.position, at.rate).force;
+}
+double ForceOf(const ExpressionLaw& law, const AlongElement& at) {
+  return at.engaged * law.force(at.position, at.rate);
+}
 
 // (5), on the body that carries a rotor.
 Vec3 CarrierMoment(const RotorLaw& law, const AlongElement& at) {
@@ -140,6 +163,9 @@ void AddEnergy(const CurveLaw& law, const AlongElement& at, Energies* energy) {
   if (!law.of_rate) energy->springs -= IntegralTo(law, at.position);
 }
 
+void AddEnergy(const CurvesLaw& /*law*/, const AlongElement& /*at*/, Energies* /*energy*/) {}
+void AddEnergy(const ExpressionLaw& /*law*/, const AlongElement& /*at*/, Energies* /*energy*/) {}
+
 void AddPower(const DampingLaw& law, const AlongElement& at, Powers* power) {
   power->dampers += ForceOf(law, at) * at.rate;
 }
@@ -163,6 +189,13 @@ void AddPower(const CurveLaw& law, const AlongElement& at, Powers* power) {
   (law.of_rate ? power->dampers : power->springs) += ForceOf(law, at) * at.rate;
 }
 
+void AddPower(const CurvesLaw& law, const AlongElement& at, Powers* power) {
+  power->dampers += ForceOf(law, at) * at.rate;
+}
+void AddPower(const ExpressionLaw& law, const AlongElement& at, Powers* power) {
+  power->dampers += ForceOf(law, at) * at.rate;
+}
+
 ElementSlope Slope(const DampingLaw& law, double /*q*/) { return {0.0, law.damping}; }
 ElementSlope Slope(const SpringLaw& law, double q) {
   const double x = q - law.free;
@@ -183,6 +216,15 @@ ElementSlope Slope(const StopLaw& law, double q) {
 ElementSlope Slope(const CurveLaw& law, double q) {
   return law.of_rate ? ElementSlope{0.0, -CurveAt(law, 0.0).slope}
                      : ElementSlope{-CurveAt(law, q).slope, 0.0};
+}
+
+ElementSlope Slope(const CurvesLaw& law, double q) {
+  const BetweenCurves at = AtRate(law, q, 0.0);
+  return {-at.over_position, -at.over_rate};
+}
+ElementSlope Slope(const ExpressionLaw& law, double q) {
+  return {-SlopeAt([&](double x) { return law.force(x, 0.0); }, q, 0.1),
+          -SlopeAt([&](double v) { return law.force(q, v); }, 0.0, 0.1)};
 }
 
 // visit(law, motion) of every element.

@@ -6,6 +6,7 @@
 //   friction F = −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇       P = F q̇ to the dampers           (4)
 //   stop     (1), (2) of StopLaw                              E = k δⁿ⁺¹/(n+1)
 //   curve    F(q) or F(q̇) by Hermite's polynomials            E = −∫ F dq of F(q)
+//            F(q, q̇) straight between such F(q)               P = F q̇ to the dampers
 // A rotor about the axis a of a body that turns with ω and ε has the additional momentum h = J n q̇
 // a:
 //   M = −dh/dt = −J n (q̈ a + q̇ ω × a) on that body            E += J n q̇ a·ω                    (5)

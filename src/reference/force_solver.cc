@@ -272,9 +272,8 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
   RequiredWrenches(mechanism_, sample->states, loads, sample->friction_signs, &required_);
   Stack(required_, &wrenches_);
   if (!wrenches_.allFinite()) {
-    if (RunSummary summary = CheckLoadsAt(mechanism_, sample->states, loads); !summary.ok()) {
-      return summary;
-    }
+    RunSummary summary = CheckForcesAt(mechanism_, sample->states, kNan, loads);
+    if (!summary.ok()) return summary;
   }
   if (RunSummary summary = CheckSpinsIdle(spins_, sample->states, required_, length_);
       !summary.ok()) {

@@ -145,7 +145,7 @@ void FreeDynamics::AddDriveForces(double t_s, const BodyStates& states,
                                   std::vector<Vec6>* wrench_W) const {
   for (const DriveForce& drive : motion_.forces) {
     const ScalarRow row = DriveRow(mechanism_, mechanism_.drives[drive.drive], states);
-    const double force = Evaluate(drive.force, t_s).value;
+    const double force = ForceAtStates(mechanism_, states, drive, t_s);
     (*wrench_W)[row.parent] += force * row.J_parent;
     (*wrench_W)[row.child] += force * row.J_child;
   }
@@ -167,16 +167,15 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
   RequiredWrenches(mechanism_, *states, command_.loads, SignsAt(*states), &required);
-  if (!Stack(required).allFinite()) {
-    if (RunSummary summary = CheckLoadsAt(mechanism_, *states, command_.loads); !summary.ok()) {
-      return summary;
-    }
+  AddDriveForces(t_s, *states, &drives);
+  if (!Stack(required).allFinite() || !Stack(drives).allFinite()) {
+    RunSummary summary = CheckForcesAt(mechanism_, *states, t_s, command_.loads, motion_.forces);
+    if (!summary.ok()) return summary;
   }
   if (RunSummary summary = CheckSpinsIdle(spins_, *states, required, length_); !summary.ok()) {
     summary.time_s = t_s;
     return summary;
   }
-  AddDriveForces(t_s, *states, &drives);
   const MatX R = Motions();
   MatX& inertia = rest_.H;
   inertia = R.transpose() * Momenta(mechanism_, *states, R);
@@ -222,9 +221,8 @@ RunSummary FreeDynamics::AccelerateNear(double t_s, BodyStates* states) {
   Unstack(VecX::Zero(size_), &states->A_WB);
   const VecX needed = NeededWrenches(t_s, *states);
   if (!needed.allFinite()) {
-    if (RunSummary summary = CheckLoadsAt(mechanism_, *states, command_.loads); !summary.ok()) {
-      return summary;
-    }
+    RunSummary summary = CheckForcesAt(mechanism_, *states, t_s, command_.loads, motion_.forces);
+    if (!summary.ok()) return summary;
   }
   std::vector<Vec6> required(mechanism_.bodies.size(), Vec6::Zero());
   Unstack(needed, &required);
@@ -276,11 +274,12 @@ void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const Mat
   rest_.d = held.gradients * A_p + held.bias;
   rest_.most.resize(held.gaps.size());
   for (size_t k = 0; k < phase_.held.size(); ++k) {
-    // Where it holds nothing, any force moves it.
+    const auto* friction = std::get_if<FrictionLaw>(&mechanism_.elements[phase_.held[k]].law);
+    // Where it holds nothing, any force moves it. A rigid stop in touch yields to none.
     rest_.most[static_cast<Eigen::Index>(k)] =
-        std::max(states.Engaged(phase_.held[k]) *
-                     std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).half_band(),
-                 std::numeric_limits<double>::min());
+        friction == nullptr ? 1.0
+                            : std::max(states.Engaged(phase_.held[k]) * friction->half_band(),
+                                       std::numeric_limits<double>::min());
   }
 }
 

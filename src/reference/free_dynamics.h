@@ -61,7 +61,7 @@ class Hermite {
 /// What every element of dry friction does.
 struct FrictionPhase {
   std::vector<int> sign;     ///< per force element: of the rate with which it slides; otherwise 0
-  std::vector<size_t> held;  ///< those that stick, increasing …
+  std::vector<size_t> held;  ///< those that stick, and rigid stops in touch, increasing …
   std::vector<double> at = {};     ///< … and the values of their coordinates [m or rad]
   std::vector<size_t> prescribed;  ///< those whose rate gives their sign
 };
@@ -182,7 +182,7 @@ class FreeDynamics {
   void FindPrescribedBands(const ForceRows& at, ReferenceSample* sample) const;
   void SolveForces(double t_s, ReferenceSample* sample);
   /// Per drive: the given force at t, or the next of those solved for.
-  [[nodiscard]] VecX GivenOr(double t_s, const VecX& solved) const;
+  [[nodiscard]] VecX GivenOr(double t_s, const BodyStates& states, const VecX& solved) const;
   void AddDriveForces(double t_s, const BodyStates& states, std::vector<Vec6>* wrench_W) const;
   [[nodiscard]] RunSummary CheckDofs(double t_s) const;
   void FillRows(double t_s, const BodyStates& states);

@@ -269,12 +269,13 @@ VecX FreeDynamics::LoadFrictionWrenches(const BodyStates& states) const {
   return wrenches;
 }
 
-VecX FreeDynamics::GivenOr(double t_s, const VecX& solved) const {
+VecX FreeDynamics::GivenOr(double t_s, const BodyStates& states, const VecX& solved) const {
   VecX force(static_cast<Eigen::Index>(mechanism_.drives.size()));
   Eigen::Index next = 0;
   for (Eigen::Index d = 0; d < force.size(); ++d) {
     const int given = motion_.FindForce(static_cast<int>(d));
-    force[d] = given >= 0 ? Evaluate(motion_.forces[given].force, t_s).value : solved[next++];
+    force[d] =
+        given >= 0 ? ForceAtStates(mechanism_, states, motion_.forces[given], t_s) : solved[next++];
   }
   return force;
 }
@@ -300,7 +301,7 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
   MBV_DEMAND(
       FillReactions(mechanism_, states, at.rows, force, &sample->reactions) == at.first_driven,
       at.first_driven);
-  sample->drive_force = GivenOr(t_s, force.segment(at.first_driven, drives));
+  sample->drive_force = GivenOr(t_s, states, force.segment(at.first_driven, drives));
   sample->prescribed_force =
       force.segment(at.first_prescribed, at.first_held - at.first_prescribed);
   FindPrescribedBands(at, sample);
@@ -341,7 +342,7 @@ VecX FreeDynamics::WorkRates(double t_s, const BodyStates& states) {
   if (motion_.commands.empty() && mechanism_.prescribed.empty() && loaded_.empty()) {
     EvaluateMotion(motion_, t_s, &command_);
     sample.drive_force =
-        GivenOr(t_s, VecX::Zero(static_cast<Eigen::Index>(mechanism_.drives.size())));
+        GivenOr(t_s, states, VecX::Zero(static_cast<Eigen::Index>(mechanism_.drives.size())));
   } else {
     SolveForces(t_s, &sample);
   }

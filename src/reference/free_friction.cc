@@ -49,12 +49,6 @@ double Root(const F& f, double a, double b) {
   return 0.5 * (low + high);
 }
 
-// The cubic with given values and derivatives at 0 and h.
-double Cubic(double h, double t, double v0, double a0, double v1, double a1) {
-  const double s = t / h, r = 1.0 - s;
-  return r * r * ((1.0 + 2.0 * s) * v0 + t * a0) + s * s * ((1.0 + 2.0 * r) * v1 - (h - t) * a1);
-}
-
 // What J · twists of a row would be if its bodies moved as much as any.
 double MostOf(const ScalarRow& row, const std::vector<Vec6>& twists, double length) {
   const auto size = [](const Vec6& twist, double scale) {
@@ -70,6 +64,11 @@ int SignOf(double value, double least) {
 }
 
 }  // namespace
+
+double Cubic(double h, double t, double v0, double a0, double v1, double a1) {
+  const double s = t / h, r = 1.0 - s;
+  return r * r * ((1.0 + 2.0 * s) * v0 + t * a0) + s * s * ((1.0 + 2.0 * r) * v1 - (h - t) * a1);
+}
 
 BodyStates FreeMotion::StatesOf(const State& x) const {
   BodyStates states = now_.states;

@@ -132,8 +132,11 @@ FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double 
       fresh_(mechanism.elements.size(), 0) {
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     if (HasFriction(mechanism.elements[e])) friction_elements_.push_back(e);
-    if (HasCorners(mechanism.elements[e])) corner_elements_.push_back(e);
+    const auto* stop = std::get_if<StopLaw>(&mechanism.elements[e].law);
+    const bool rigid = stop != nullptr && stop->rigid();
+    if (HasCorners(mechanism.elements[e]) && !rigid) corner_elements_.push_back(e);
   }
+  FindEnds();
   now_.states.Resize(mechanism.bodies.size());
   work_states_ = sampled_ = now_.states;
   double mass = 0.0;
@@ -180,6 +183,7 @@ RunSummary FreeMotion::Start(const BodyStates& states) {
   RunSummary summary = dynamics_.Accelerate(0.0, &now_.states);
   now_.pivot = largest_pivot_ = dynamics_.pivot();
   if (summary.ok() && !friction_elements_.empty()) summary = BeginFriction();
+  if (summary.ok() && !ends_.empty()) summary = StartStops();
   if (!summary.ok()) return summary;
   NoteFriction();
   NoteCorners();
@@ -237,10 +241,24 @@ VecX FreeMotion::LoadsAfter(double h) {
   states.turns = now_.states.turns;
   CommandSample at;
   EvaluateMotion(motion_, t_s, &at);
-  VecX loads(6 * static_cast<Eigen::Index>(at.loads.size()));
+  const auto of_loads = 6 * static_cast<Eigen::Index>(at.loads.size());
+  const auto of_drives = static_cast<Eigen::Index>(motion_.forces.size());
+  VecX loads =
+      VecX::Zero(of_loads + of_drives + static_cast<Eigen::Index>(mechanism_.elements.size()));
   for (size_t k = 0; k < at.loads.size(); ++k) {
     const LoadSample load = AtStates(mechanism_, states, at.loads[k]);
     loads.segment<6>(6 * static_cast<Eigen::Index>(k)) << load.force, load.moment;
+  }
+  for (size_t k = 0; k < motion_.forces.size(); ++k) {
+    loads[of_loads + static_cast<Eigen::Index>(k)] =
+        ForceAtStates(mechanism_, states, motion_.forces[k], t_s);
+  }
+  for (size_t e = 0; e < mechanism_.elements.size(); ++e) {
+    const auto* law = std::get_if<ExpressionLaw>(&mechanism_.elements[e].law);
+    if (law == nullptr) continue;
+    const ScalarRow row = ElementRow(mechanism_, e, states);
+    loads[of_loads + of_drives + static_cast<Eigen::Index>(e)] =
+        law->force(row.value, RateOf(row, states.V_WB));
   }
   return loads;
 }
@@ -265,13 +283,23 @@ std::optional<FreeMotion::LoadJump> FreeMotion::JumpHere() {
   }
   trouble_ = RunSummary::Done();
   if (!(std::abs(after[most] - before[most]) > 0.5 * whole * scale[most])) return {};
-  const auto component = most % 6;
-  return LoadJump{
-      .part = fmt::format("loads.{}.{}[{}]", motion_.loads[static_cast<size_t>(most / 6)].name,
-                          component < 3 ? "force" : "moment", component % 3),
-      .unit = component < 3 ? "N" : "N m",
-      .before = before[most],
-      .after = after[most]};
+  LoadJump jump{.part = {}, .unit = "N", .before = before[most], .after = after[most]};
+  const auto at = static_cast<size_t>(most), loads = 6 * motion_.loads.size();
+  if (at < loads) {
+    const bool force = at % 6 < 3;
+    jump.part = fmt::format("loads.{}.{}[{}]", motion_.loads[at / 6].name,
+                            force ? "force" : "moment", at % 3);
+    if (!force) jump.unit = "N m";
+  } else if (at < loads + motion_.forces.size()) {
+    const DriveForce& force = motion_.forces[at - loads];
+    jump.part = PathOf(mechanism_, force);
+    jump.unit = ForceUnit(mechanism_, mechanism_.drives[static_cast<size_t>(force.drive)]);
+  } else {
+    const ForceElement& element = mechanism_.elements[at - loads - motion_.forces.size()];
+    jump.part = element.name;
+    if (!ActsOnLength(mechanism_, element)) jump.unit = "N m";
+  }
+  return jump;
 }
 
 RunSummary FreeMotion::NoWayOn(double dt_s) {
@@ -343,6 +371,9 @@ RunSummary FreeMotion::LookAhead() {
 // One smooth piece, or a bridge beyond its end.
 RunSummary FreeMotion::Segment(double to_s) {
   time_.StartFrom(now_.time_s);
+  if (!in_touch_.empty()) {  // forces may have jumped
+    if (RunSummary summary = KeepInTouch(in_touch_); !summary.ok()) return summary;
+  }
   if (!motion_.switches.empty()) {
     if (RunSummary summary = SwitchFriction(to_s); !summary.ok()) return summary;
     NoteFriction();
@@ -382,7 +413,18 @@ RunSummary FreeMotion::Segment(double to_s) {
     } else if (to_the_end) {
       t = to_s;
     }
-    if (RunSummary summary = AcceptWithFriction(x, t, corner); !summary.ok()) return summary;
+    const auto impact = ends_.empty() ? std::nullopt : FirstImpact(corner, x);
+    if (impact) {
+      x = StepFrom(Pack(now_), impact->after_s);
+      if (!trouble_.ok()) return trouble_;
+      t = impact->after_s < corner ? now_.time_s + impact->after_s : t;
+    }
+    RunSummary accepted_at =
+        impact && impact->after_s == 0.0 ? RunSummary::Done() : AcceptWithFriction(x, t, corner);
+    if (accepted_at.ok() && impact) {
+      accepted_at = impact->hits.empty() ? LetGo(impact->leaves) : Strike(impact->hits);
+    }
+    if (!accepted_at.ok()) return accepted_at;
     NoteFriction();
     NoteCorners();
     if (tried < kSmallestStepShare * duration_s_ && !to_the_end) return NoWayOn(tried);
@@ -409,7 +451,9 @@ void FreeMotion::NoteFriction() {
   for (const size_t e : all_friction_) {
     if (std::ranges::count(off_, e) > 0) note(e, Happening::kSwitchedOff);
   }
-  for (const size_t e : phase.held) note(e, Happening::kRests);
+  for (const size_t e : phase.held) {
+    if (HasFriction(mechanism_.elements[e])) note(e, Happening::kRests);
+  }
   for (const size_t e : friction_elements_) {
     if (phase.sign[e] != 0) note(e, HappeningAt(phase.sign[e]));
   }
@@ -450,9 +494,11 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
     time_.StartFrom(now_.time_s);
     RunSummary summary = SwitchFriction(now_.time_s + motion_.sample_s);
     if (summary.ok()) summary = CheckFriction();
+    if (summary.ok() && !in_touch_.empty()) summary = KeepInTouch(in_touch_);
     if (!summary.ok()) return summary;
     NoteFriction();
   }
+  impacts_here_ = 0;
   on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(duration_s_, t_s);
   if (on_bridge_) return SampleBridge(t_s);
   return Accelerate(now_.time_s, &now_.states);
@@ -679,7 +725,8 @@ bool FreeMotion::RatesFit(const Hermite& way, double t_s, double to_s, double ki
 }
 
 void FreeMotion::TryBridge() {
-  if (!friction_elements_.empty()) return;  // what slides could stop on it
+  // What slides could stop on it, what moves could hit a stop.
+  if (!friction_elements_.empty() || !ends_.empty()) return;
   if (!(now_.pivot < kBridge * largest_pivot_)) return;
   const double half = TimeToSingular(), landing = now_.time_s + 2.0 * half;
   if (!std::isfinite(landing)) return;

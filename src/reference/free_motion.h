@@ -38,6 +38,9 @@ struct Effort {
   std::function<void(double fraction)> progress = {};  ///< of the motion's duration; may be empty
 };
 
+/// At t, the cubic with given values and derivatives at 0 and h.
+[[nodiscard]] double Cubic(double h, double t, double v0, double a0, double v1, double a1);
+
 class FreeMotion {
  public:
   /// Mechanism and motion outlive the object. Steps are at most `largest_step_s`.
@@ -134,15 +137,40 @@ class FreeMotion {
   [[nodiscard]] VecX ElementRates(const BodyStates& states) const;
   /// Rates that the integration does not distinguish from zero.
   [[nodiscard]] double Resolved(size_t element) const;
+  // An end of a rigid stop: the upper one (1) or the lower one (−1), and the way to it.
+  struct End {
+    size_t element = 0;
+    int side = 1;
+  };
+  struct Gap {
+    double way = 0.0, rate = 0.0;  // [m or rad, per second]
+  };
+  // What is hit, or, of what is in touch, what would be pulled.
+  struct ImpactEvent {
+    double after_s = 0.0;
+    std::vector<End> hits = {}, leaves = {};
+  };
+  void FindEnds();
+  [[nodiscard]] Gap GapOf(const End& end, const BodyStates& states) const;
+  [[nodiscard]] double Touches(const End& end) const;
+  [[nodiscard]] bool IsInTouch(const End& end) const;
+  [[nodiscard]] RunSummary StartStops();
+  [[nodiscard]] std::optional<ImpactEvent> FirstImpact(double h, const State& to);
+  [[nodiscard]] VecX TouchForces() const;
+  void HoldTouch();
+  [[nodiscard]] RunSummary KeepInTouch(std::vector<End> may_stay);
+  [[nodiscard]] RunSummary LetGo(const std::vector<End>& leaves);
+  [[nodiscard]] RunSummary Strike(const std::vector<End>& hits);
   [[nodiscard]] BodyStates StatesOf(const State& x) const;
   [[nodiscard]] RunSummary NoWayOn(double dt_s);
   struct LoadJump {
     std::string part, unit;
     double before = 0.0, after = 0.0;
   };
-  /// Force and moment [N, N m] of every load a step of h on from now_.
+  /// Force and moment [N, N m] of every load a step of h on from now_, then given drive forces,
+  /// then those of elements that are expressions.
   [[nodiscard]] VecX LoadsAfter(double h);
-  /// The component of a load that changes at once about now_.
+  /// What of these changes at once about now_.
   [[nodiscard]] std::optional<LoadJump> JumpHere();
   [[nodiscard]] RunSummary TooManySteps() const;
   /// Every this many steps: whether the springs let the rest be done with the steps that are left.
@@ -180,7 +208,9 @@ class FreeMotion {
   std::vector<size_t> all_friction_;       ///< with those that are
   std::vector<size_t> off_;
   std::vector<size_t> corner_elements_;
-  std::vector<char> fresh_;  ///< per element: slides since this very time
+  std::vector<char> fresh_;           ///< per element: slides since this very time
+  std::vector<End> ends_, in_touch_;  ///< of rigid stops; in touch: by increasing elements
+  int impacts_here_ = 0;              ///< since the last sample
   EventLog log_;
   int settled_here_ = 0;  ///< how often friction was decided at this very time
 };

@@ -38,9 +38,9 @@ constexpr double kMissedBySteps = 2e-6;
 constexpr double kMostTableSteps = 2e5;  // no smaller step is taken than that gives
 
 const std::vector<std::string> kMotionScenarioKeys = {
-    "kind",      "mechanism", "description", "parameters", "gravity", "motion",    "loads",
-    "forces",    "analytic",  "reference",   "simulation", "checks",  "snapshots", "expect",
-    "witnesses", "figures",   "contacts",    "phases",     "switches"};
+    "kind",      "mechanism", "description", "parameters", "gravity",  "motion",    "loads",
+    "forces",    "analytic",  "reference",   "simulation", "checks",   "snapshots", "expect",
+    "witnesses", "figures",   "contacts",    "phases",     "switches", "variables"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -124,7 +124,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
                                   {.motion = motion,
                                    .loads = map.Find("loads"),
                                    .forces = map.Find("forces"),
-                                   .switches = map.Find("switches")},
+                                   .switches = map.Find("switches"),
+                                   .variables = map.Find("variables")},
                                   times, PhaseMotionOf(), &table_findings_);
     ResolveTables(*motion, map.Find("simulation"));
     FitStep(map.Find("simulation"));

@@ -38,9 +38,13 @@ Command AsCommand(const std::string& name, const Coordinate& coordinate) {
 
 class FreeMotionReader {
  public:
-  FreeMotionReader(ValueReader* values, const Mechanism& mechanism, ProfileTables* tables,
-                   Motion* motion)
-      : values_(values), mechanism_(mechanism), tables_(tables), motion_(motion) {
+  FreeMotionReader(ValueReader* values, const Mechanism& mechanism, StateFunctions* functions,
+                   ProfileTables* tables, Motion* motion)
+      : values_(values),
+        mechanism_(mechanism),
+        functions_(*functions),
+        tables_(tables),
+        motion_(motion) {
     known_ = StateCoordinates(mechanism);
   }
 
@@ -89,8 +93,13 @@ class FreeMotionReader {
                                    .name = "forces." + entry.key,
                                    .may_jump = true,
                                    .tables = tables_};
-      motion_->forces.push_back(
-          {drive, ReadProfile(values_, *entry.value, "forces." + entry.key, context)});
+      DriveForce force{.drive = drive, .force = {}};
+      if (functions_.Follows(*entry.value)) {
+        force.following = functions_.Read(*entry.value, context.name);
+      } else {
+        force.force = ReadProfile(values_, *entry.value, context.name, context);
+      }
+      motion_->forces.push_back(std::move(force));
     }
   }
 
@@ -211,6 +220,7 @@ class FreeMotionReader {
 
   ValueReader* values_;
   const Mechanism& mechanism_;
+  StateFunctions& functions_;
   ProfileTables* tables_;
   Motion* motion_;
   std::vector<NamedCoordinate> known_;
@@ -227,8 +237,9 @@ bool IsFree(const YamlNode* motion, const YamlNode* forces) {
 // the start values: DOFs that are not named start at home, at rest, in joint coordinates in
 // model order. Findings go to the reader.
 void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode& motion_node,
-                    const YamlNode* forces, ProfileTables* tables, Motion* motion) {
-  FreeMotionReader(values, mechanism, tables, motion).Read(motion_node, forces);
+                    const YamlNode* forces, StateFunctions* functions, ProfileTables* tables,
+                    Motion* motion) {
+  FreeMotionReader(values, mechanism, functions, tables, motion).Read(motion_node, forces);
 }
 
 }  // namespace
@@ -379,17 +390,69 @@ class FunctionReader {
 
 }  // namespace
 
-bool FollowsState(const ValueReader& values, const YamlNode& node) {
+StateFunctions::StateFunctions(ValueReader* values, const Mechanism& mechanism,
+                               const YamlNode* variables)
+    : values_(*values), mechanism_(mechanism) {
+  if (variables == nullptr) return;
+  YamlReader& yaml = values->yaml();
+  for (const YamlEntry& entry : yaml.Entries(*variables, "variables")) {
+    const std::string path = "variables." + entry.key;
+    std::string why_not = WhyNoParameterName(entry.key);
+    if (entry.key == kTime) why_not = "t is the time here";
+    if (values->HasParameter(entry.key)) why_not = "it is a parameter of " + mechanism.name;
+    if (!why_not.empty()) {
+      yaml.Error(entry, fmt::format("{}: {}", path, why_not));
+    } else if (const auto text = yaml.Text(*entry.value, path)) {
+      variables_[entry.key] = *text;
+    }
+  }
+  for (const YamlEntry& entry : yaml.Entries(*variables, "variables")) {
+    if (!yaml.has_errors()) (void)Read(*entry.value, "variables." + entry.key);
+  }
+}
+
+bool StateFunctions::Follows(const YamlNode& node) const {
   if (!node.is_scalar()) return false;
   const std::vector<Piece> pieces = PiecesOf(node.text);
   return std::ranges::any_of(pieces, [&](const Piece& piece) {
-    return piece.is_dotted() || (piece.text == kTime && !values.HasParameter(kTime));
+    return piece.is_dotted() || (piece.text == kTime && !values_.HasParameter(kTime)) ||
+           (piece.is_word && variables_.contains(piece.text));
   });
 }
 
-std::optional<StateFunction> ReadStateFunction(ValueReader* values, const Mechanism& mechanism,
-                                               const YamlNode& node, const std::string& path) {
-  return FunctionReader(values, mechanism).Read(node, path);
+// The text with variables replaced by what they stand for.
+std::optional<std::string> StateFunctions::Expanded(const YamlNode& node, const std::string& path,
+                                                    const std::string& text, int depth) const {
+  constexpr int kDeepest = 20;
+  constexpr size_t kLongest = 100000;
+  std::string out;
+  for (const Piece& piece : PiecesOf(text)) {
+    const auto found = piece.is_word ? variables_.find(piece.text) : variables_.end();
+    if (found == variables_.end()) {
+      out += piece.text;
+      continue;
+    }
+    const auto inner =
+        depth < kDeepest ? Expanded(node, path, found->second, depth + 1) : std::nullopt;
+    if (!inner || out.size() + inner->size() > kLongest) {
+      if (depth == 0) {
+        values_.yaml().Error(node, fmt::format("{}: variable '{}' refers to itself, or stands for "
+                                               "too much",
+                                               path, piece.text));
+      }
+      return std::nullopt;
+    }
+    out += "(" + *inner + ")";
+  }
+  return out;
+}
+
+std::optional<StateFunction> StateFunctions::Read(const YamlNode& node, const std::string& path) {
+  const auto text = Expanded(node, path, node.text, 0);
+  if (!text) return std::nullopt;
+  YamlNode expanded = node;
+  expanded.text = *text;
+  return FunctionReader(&values_, mechanism_).Read(expanded, path);
 }
 
 namespace {
@@ -409,6 +472,7 @@ class MotionReader {
 
   Motion Read(const MotionSections& sections) {
     const YamlNode *node = sections.motion, *forces = sections.forces;
+    functions_.emplace(values_, mechanism_, sections.variables);
     YamlMap map(&yaml(), node, "motion",
                 {"duration_s", "sample_s", "commands", "equal", "path", "pose_table", "initial",
                  "initial_rates"});
@@ -425,7 +489,7 @@ class MotionReader {
       CheckShares(*sections.switches);
     }
     if (map.valid() && node != nullptr && IsFree(node, forces)) {
-      ReadFreeMotion(values_, mechanism_, *node, forces, &tables_, &motion_);
+      ReadFreeMotion(values_, mechanism_, *node, forces, &*functions_, &tables_, &motion_);
       if (HasPayloads(motion_)) {
         yaml().Error(*sections.switches,
                      "switches: the mass of a body changes in commanded motions only",
@@ -435,12 +499,33 @@ class MotionReader {
       yaml().Error(*node, "motion commands nothing",
                    "give commands, equal, path or pose_table; or forces and initial values");
     }
+    if (map.valid() && node != nullptr) CheckRigidStops(*node);
     TakeTables();
     return motion_;
   }
 
  private:
   YamlReader& yaml() { return values_->yaml(); }
+
+  // They act where forces move what hits them, without dry friction beside, whose share in an
+  // impact and in what then rests is not computed.
+  void CheckRigidStops(const YamlNode& node) {
+    const auto stop = std::ranges::find_if(mechanism_.elements, IsRigidStop);
+    if (stop == mechanism_.elements.end()) return;
+    if (!motion_.free()) {
+      yaml().Warn(node,
+                  fmt::format("the rigid {} ('{}') does nothing in commanded motions",
+                              Described(mechanism_, *stop), stop->name),
+                  "range: of a drive or joint refuses motions that leave it; stiffness: makes the "
+                  "stop elastic");
+    } else if (const std::string friction = FirstFriction(mechanism_); !friction.empty()) {
+      yaml().Error(node,
+                   fmt::format("motion: the rigid {} ('{}') and the dry friction of '{}' are "
+                               "not computed together",
+                               Described(mechanism_, *stop), stop->name, friction),
+                   "stiffness: instead of restitution makes the stop elastic");
+    }
+  }
 
   // Every table must last as long as the motion.
   void TakeTables() {
@@ -751,12 +836,16 @@ class MotionReader {
                           names[e].substr(0, names[e].size() - 2) == entry.key;
         if (names[e] != entry.key && !axis) continue;
         const auto* curve = std::get_if<CurveLaw>(&element.law);
-        if (!std::holds_alternative<FrictionLaw>(element.law) &&
-            (curve == nullptr || !curve->of_rate)) {
+        const bool stores = curve == nullptr
+                                ? !std::holds_alternative<FrictionLaw>(element.law) &&
+                                      !std::holds_alternative<CurvesLaw>(element.law) &&
+                                      !std::holds_alternative<ExpressionLaw>(element.law)
+                                : !curve->of_rate;
+        if (stores) {
           yaml().Error(entry,
                        fmt::format("{}: a {} stores energy or is MuJoCo's own, and is not switched",
                                    path, Described(mechanism_, element)),
-                       "dry friction and curves of the rate are");
+                       "dry friction, curves of the rate or of both, and expressions are");
           return;
         }
         motion_.switches.push_back({.name = entry.key, .element = e, .share = share});
@@ -837,8 +926,8 @@ class MotionReader {
     if (!items) return;
     for (size_t i = 0; i < 3; ++i) {
       const std::string name = fmt::format("{}[{}]", path, i);
-      if (FollowsState(*values_, *(*items)[i])) {
-        const auto function = ReadStateFunction(values_, mechanism_, *(*items)[i], name);
+      if (functions_->Follows(*(*items)[i])) {
+        const auto function = functions_->Read(*(*items)[i], name);
         if (function) load->following.push_back({first + static_cast<int>(i), *function});
         continue;
       }
@@ -883,6 +972,7 @@ class MotionReader {
   const MotionTimes otherwise_;
   const PhaseMotion phase_;
   std::vector<NamedCoordinate> known_;
+  std::optional<StateFunctions> functions_;
   ProfileTables tables_;
   Motion motion_;
   bool times_known_ = false;

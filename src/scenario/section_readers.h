@@ -1,6 +1,7 @@
 // The sections of a scenario file: `motion:`, `loads:` and `forces:`, then the others.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,14 +31,24 @@ namespace mbv {
 // Names with dots are coordinates (StateCoordinates()) with .position or .velocity behind, t is the
 // time [s]; other names are parameters, which are constants. SI units, radians.
 
-/// True for a text that names the time or a coordinate.
-[[nodiscard]] bool FollowsState(const ValueReader& values, const YamlNode& node);
+/// Reads them, with the names that a scenario gives to parts of them (`variables`).
+class StateFunctions {
+ public:
+  /// `variables` may be null.
+  StateFunctions(ValueReader* values, const Mechanism& mechanism, const YamlNode* variables);
 
-/// Empty after a finding.
-[[nodiscard]] std::optional<StateFunction> ReadStateFunction(ValueReader* values,
-                                                             const Mechanism& mechanism,
-                                                             const YamlNode& node,
-                                                             const std::string& path);
+  /// True for a text that names the time, a coordinate or a variable.
+  [[nodiscard]] bool Follows(const YamlNode& node) const;
+  /// Empty after a finding.
+  [[nodiscard]] std::optional<StateFunction> Read(const YamlNode& node, const std::string& path);
+
+ private:
+  [[nodiscard]] std::optional<std::string> Expanded(const YamlNode& node, const std::string& path,
+                                                    const std::string& text, int depth) const;
+  ValueReader& values_;
+  const Mechanism& mechanism_;
+  std::map<std::string, std::string> variables_;
+};
 
 /// Times for a motion that states none, from a table that it is compared with.
 struct MotionTimes {
@@ -53,7 +64,8 @@ struct PhaseMotion {
 
 /// Sections of a scenario about motion; null: left out.
 struct MotionSections {
-  const YamlNode *motion = nullptr, *loads = nullptr, *forces = nullptr, *switches = nullptr;
+  const YamlNode *motion = nullptr, *loads = nullptr, *forces = nullptr, *switches = nullptr,
+                 *variables = nullptr;
 };
 
 /// Reads the sections (`motion` is there) against a mechanism, with the tables that profiles name.

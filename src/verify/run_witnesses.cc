@@ -64,6 +64,18 @@ class ForeignRunner {
         return "loads that are expressions of the state are not handed to foreign witnesses";
       }
     }
+    for (const DriveForce& force : motion_.forces) {
+      if (force.following) {
+        return "drive forces that are expressions of the state are not handed to foreign witnesses";
+      }
+    }
+    for (const ForceElement& element : mechanism_.elements) {
+      const auto* stop = std::get_if<StopLaw>(&element.law);
+      if (std::holds_alternative<ExpressionLaw>(element.law) || (stop && stop->rigid())) {
+        return fmt::format("the {} '{}' is not handed to foreign witnesses",
+                           Described(mechanism_, element), element.name);
+      }
+    }
     for (const Drive& drive : mechanism_.drives) {
       if (!drive.compensates_gravity) continue;
       return fmt::format(

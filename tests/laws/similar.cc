@@ -117,11 +117,21 @@ void Scale(const Mechanism& mechanism, double s, ForceElement* element) {
     stop->damping *= force / unit;
     stop->dissipation /= unit;
   }
-  if (auto* curve = std::get_if<CurveLaw>(&element->law)) {
+  const auto scale = [&](CurveLaw* curve) {
     for (CurveLaw::Knot& knot : curve->knots) {
       knot = {knot.at * unit, knot.force * force, knot.slope_before * force / unit,
               knot.slope_after * force / unit};
     }
+  };
+  if (auto* curve = std::get_if<CurveLaw>(&element->law)) scale(curve);
+  if (auto* curves = std::get_if<CurvesLaw>(&element->law)) {
+    for (CurveLaw& curve : curves->curves) scale(&curve);
+    for (double& rate : curves->rates) rate *= unit;
+  }
+  if (auto* expression = std::get_if<ExpressionLaw>(&element->law)) {
+    expression->force = [=, at = expression->force](double x, double v) {
+      return force * at(x / unit, v / unit);
+    };
   }
   if (auto* rotor = std::get_if<RotorLaw>(&element->law)) rotor->inertia *= force / unit;
   auto* spring = std::get_if<SpringLaw>(&element->law);
@@ -229,6 +239,9 @@ Motion Similar(const Mechanism& mechanism, const Motion& motion, const Similarit
   for (DriveForce& force : out.forces) {
     const bool torque = ForceUnit(mechanism, mechanism.drives[force.drive]) == "N m";
     force.force = Scaled(force.force, torque ? s * s : s);
+    if (force.following) {
+      force.following = Scaled(mechanism, *force.following, s, torque ? s * s : s);
+    }
   }
   for (Load& load : out.loads) {
     load.p_BoQ_B *= s;

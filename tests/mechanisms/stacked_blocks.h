@@ -69,6 +69,31 @@ struct StackedBlocks {
   }
 };
 
+/// A block thrown up from a rigid stop at 0 by a force that pulls it back: its n-th flight begins
+/// with v0 ε^n and lasts 2 v0 ε^n/g, and at rest_s() it rests there.
+struct BouncingBlock {
+  static constexpr double mass = 2.0, g = 10.0, v0 = 1.5;
+  double restitution = 0.6;
+
+  [[nodiscard]] Mechanism Make() const {
+    Mechanism m = StackedBlocks{{mass}, {{}}}.Make();
+    m.elements[0].law = StopLaw{.lower = 0.0, .restitution = restitution};
+    return m;
+  }
+  [[nodiscard]] static Motion Thrown(const Mechanism& m, double duration_s) {
+    Motion motion = StackedBlocks::From(m, 0.0, v0, duration_s);
+    motion.forces[0].force = Constant(-mass * g);
+    return motion;
+  }
+  [[nodiscard]] double rest_s() const { return 2.0 * v0 / g / (1.0 - restitution); }
+  [[nodiscard]] double Position(double t) const {
+    if (t >= rest_s()) return 0.0;
+    double v = v0;
+    while (t >= 2.0 * v / g) t -= 2.0 * v / g, v *= restitution;
+    return v * t - 0.5 * g * t * t;
+  }
+};
+
 /// A block on a freewheel that holds it against smaller positions, pushed by A sin ωt − B: it
 /// starts where that pushes forward, at t_0, comes to rest at t_1, and starts again a period later.
 struct RatchetedBlock {

@@ -311,6 +311,34 @@ TEST(StopsAndCurves, AreReadWrittenAndReadAgain) {
   EXPECT_EQ(LawOf<CurveLaw>(*again.mechanism, 4).knots[1].slope_after, fan.knots[1].slope_after);
 }
 
+TEST(StopsAndCurves, CurvesAtRatesExpressionsAndRigidStopsAreReadWrittenAndReadAgain) {
+  const std::string lines =
+      "  air: {kind: curve, joint: turn, of: both, rates_rpm: [-60, 0, 60],"
+      " points_deg: [[0, 9, 0, -4], [90, 30, 0, -15]], beyond: held, beyond_rates: linear}\n"
+      "  gas: {kind: expression, from: a, to: b.p, force: \"F_0*(1 - x^2) - exp(-v)*v\"}\n"
+      "  wall: {kind: stop, joint: slide, upper_mm: 130, restitution: e_wall}\n";
+  const LoadResult loaded =
+      LoadModelText(WithElements(lines) + "parameters: {F_0: 7, e_wall: 0.4}\n", "m.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  const auto& air = LawOf<CurvesLaw>(m, 0);
+  EXPECT_DOUBLE_EQ(air.rates[2], 2.0 * std::numbers::pi);
+  ASSERT_EQ(air.curves.size(), 3u);
+  EXPECT_DOUBLE_EQ(air.curves[0].knots[1].at, std::numbers::pi / 2);
+  EXPECT_EQ(air.curves[2].knots[1].force, -15);
+  EXPECT_EQ(air.curves[2].knots[0].slope_before, 0);
+  EXPECT_FALSE(air.held);
+  const auto& gas = LawOf<ExpressionLaw>(m, 1);
+  EXPECT_EQ(gas.text, "(7)*(1 - x^2) - exp(-v)*v");
+  EXPECT_DOUBLE_EQ(gas.force(0.5, 2.0), 7 * 0.75 - 2.0 * std::exp(-2.0));
+  EXPECT_EQ(LawOf<StopLaw>(m, 2).restitution, 0.4);
+  EXPECT_TRUE(IsRigidStop(m.elements[2]));
+  const LoadResult again = LoadModelText(WriteModel(m), "m.yaml");
+  ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
+  EXPECT_EQ(WriteModel(*again.mechanism), WriteModel(m));
+  EXPECT_EQ(LawOf<ExpressionLaw>(*again.mechanism, 1).force(0.5, 2.0), gas.force(0.5, 2.0));
+}
+
 TEST(StopsAndCurves, WhatMeansNothingIsAFinding) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"{kind: stop, joint: turn, stiffness: 5}", "needs lower, upper, or both"},
@@ -335,6 +363,25 @@ TEST(StopsAndCurves, WhatMeansNothingIsAFinding) {
       {"{kind: curve, joint: turn, points: [[0, 0], [1, 1]], beyond: nowhere}", "nowhere"},
       {"{kind: curve, joint: turn, of: force, points: [[0, 0], [1, 1]], beyond: held}", "force"},
       {"{kind: curve, joint: turn, points: [[0, 0], [1, 1]], slopes: [[0, 0]]}", "one pair"},
+      {"{kind: curve, joint: turn, of: both, points: [[0, 0]], beyond: held}", "rates"},
+      {"{kind: curve, joint: turn, of: both, rates: [0, 1], points: [[0, 1, 2], [1, 2]],"
+       " beyond: held, beyond_rates: held}",
+       "a list of 3"},
+      {"{kind: curve, joint: turn, of: both, rates: [1, 0], points: [[0, 1, 2], [1, 2, 3]],"
+       " beyond: held, beyond_rates: held}",
+       "rates must increase"},
+      {"{kind: curve, joint: turn, of: both, rates: [0, 1], points: [[0, 1, 2], [0, 2, 3]],"
+       " beyond: held, beyond_rates: held}",
+       "must increase"},
+      {"{kind: curve, joint: turn, rates: [0, 1], points: [[0, 0], [1, 1]], beyond: held}",
+       "belongs to of: both"},
+      {"{kind: rope, from: a, to: b}", "not expressible: a cable that goes slack"},
+      {"{kind: rolling, joint: turn}", "not expressible: rolling without slip"},
+      {"{kind: expression, joint: turn}", "force"},
+      {"{kind: expression, joint: turn, force: \"-k*x\"}", "'k'"},
+      {"{kind: expression, joint: turn, force: \"-2*(x\"}", "is not an expression"},
+      {"{kind: stop, joint: turn, upper: 1, restitution: 1.5}", "0 <= restitution <= 1"},
+      {"{kind: stop, joint: turn, upper: 1, restitution: 0.5, stiffness: 3}", "both restitution"},
       {"{kind: rotor, from: a, to: b, inertia: 1}", "turns no rotor"},
       {"{kind: damping, from: a, to: b, coordinate: 1, damping: 1}", "one coordinate"},
   };

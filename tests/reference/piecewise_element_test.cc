@@ -122,6 +122,98 @@ TEST(PiecewiseElements, AStopWithADamperNeitherPullsNorDoublesItsForce) {
   EXPECT_LT(ColumnOf(run.trace, "dampers.work").tail<1>()[0], -0.1);
 }
 
+// Curves at three rates that are −k x − c v, and an expression of it, against the damped swing.
+TEST(PiecewiseElements, CurvesAtRatesAndExpressionsAreTheSpringAndDamperThatTheyDescribe) {
+  const double k = kStiffness, c = 8.0, decay = c / (2.0 * kBlockMass);
+  const double w = std::sqrt(k / kBlockMass - decay * decay);
+  const auto swing = [&](double t) { return kSpeed / w * std::exp(-decay * t) * std::sin(w * t); };
+  const auto curves = [&](double damping) {
+    CurvesLaw law{.rates = {-2.0, 0.5, 3.0}, .curves = {}};
+    for (const double rate : law.rates) {
+      law.curves.push_back({.knots = {{-0.05, 0.05 * k - damping * rate, -k, -k},
+                                      {0.02, -0.02 * k - damping * rate, -k, -k}}});
+    }
+    return law;
+  };
+  const auto expression = [&](double damping) {
+    return ExpressionLaw{.text = "-k*x - c*v",
+                         .force = [=](double x, double v) { return -k * x - damping * v; }};
+  };
+  EXPECT_LT(FarthestFrom(Free(BlockOn(curves(c))), swing), kTracked);
+  EXPECT_LT(FarthestFrom(Free(BlockOn(expression(c))), swing), kTracked);
+  EXPECT_GT(FarthestFrom(Free(BlockOn(curves(c * (1 + 1e-6)))), swing), 1e-9);
+  EXPECT_GT(FarthestFrom(Free(BlockOn(expression(c * (1 + 1e-6)))), swing), 1e-9);
+  const ForwardRun run = Free(BlockOn(curves(c)));
+  const VecX balance = ColumnOf(run.trace, "energy.kinetic") - ColumnOf(run.trace, "dampers.work");
+  EXPECT_LT((balance.array() - balance[0]).abs().maxCoeff(), kTracked * balance[0]);
+}
+
+TEST(PiecewiseElements, AnExpressionWithoutValueEndsTheRunByItsName) {
+  const ExpressionLaw law{.text = "sqrt(0.1 - x)",
+                          .force = [](double x, double) { return std::sqrt(0.1 - x); }};
+  Mechanism m = BlockOn(law);
+  const ForwardRun run = RunForwardReference(m, StackedBlocks::From(m, 0.0, kSpeed, 0.6));
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(run.summary.where, m.elements[0].name);
+  EXPECT_NE(run.summary.message.find("is not a number"), std::string::npos) << run.summary.message;
+}
+
+TEST(RigidStops, ABlockBouncesAsItsClosedFormAndRests) {
+  const BouncingBlock block;
+  const Mechanism m = block.Make();
+  const auto position = [&](double t) { return block.Position(t); };
+  ForwardRun run = RunForwardReference(m, BouncingBlock::Thrown(m, 1.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_LT(FarthestFrom(run, position), 1e-12);
+  const double energy = 0.5 * block.mass * block.v0 * block.v0;
+  EXPECT_NEAR(ColumnOf(run.trace, "dampers.work").tail<1>()[0], -energy, 1e-12 * energy);
+  const std::vector<MotionEvent>& events = run.trace.events;
+  ASSERT_GT(events.size(), 10u);
+  EXPECT_EQ(events[0].what, Happening::kHitsLower);
+  EXPECT_NEAR(events[0].time_s, 0.3, 1e-14);
+  EXPECT_NEAR(events[1].time_s, 0.3 + 0.18, 1e-13);
+  EXPECT_EQ(events.back().what, Happening::kLowerEnd);
+  EXPECT_NEAR(events.back().time_s, block.rest_s(), 1e-6);
+  const Mechanism wrong = BouncingBlock{.restitution = 0.6 * (1 + 1e-6)}.Make();
+  run = RunForwardReference(wrong, BouncingBlock::Thrown(wrong, 1.0));
+  EXPECT_GT(FarthestFrom(run, position), 1e-8);
+}
+
+TEST(RigidStops, NothingIsLostWhereNothingIs) {
+  const BouncingBlock block{.restitution = 1.0};
+  const Mechanism m = block.Make();
+  const ForwardRun run = RunForwardReference(m, BouncingBlock::Thrown(m, 1.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    const double t = std::fmod(run.trace.time_s[i], 0.3);
+    if (std::min(t, 0.3 - t) < 1e-9) continue;
+    EXPECT_NEAR(ColumnOf(run.trace, "motor1.position")[static_cast<Eigen::Index>(i)],
+                1.5 * t - 5.0 * t * t, 1e-12);
+  }
+}
+
+TEST(RigidStops, WhatLeansLeavesWhereItWouldBePulled) {
+  const RatchetedBlock ratchet;
+  Mechanism m = ratchet.Make();
+  m.elements[0].law = StopLaw{.lower = 0.0, .restitution = 0.0};
+  const double duration_s = ratchet.start() + ratchet.moves();
+  const ForwardRun run = RunForwardReference(m, ratchet.Pushed(m, duration_s));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const double error = FarthestFrom(
+      run, [&](double t) { return t < ratchet.start() ? 0.0 : ratchet.Way(t - ratchet.start()); });
+  EXPECT_LT(error, 1e-12);
+  ASSERT_EQ(run.trace.events.size(), 2u);
+  EXPECT_EQ(run.trace.events[1].what, Happening::kFree);
+  EXPECT_NEAR(run.trace.events[1].time_s, ratchet.start(), 1e-9);
+}
+
+TEST(RigidStops, AStartBeyondAnEndIsNamed) {
+  const Mechanism m = BouncingBlock().Make();
+  const ForwardRun run = RunForwardReference(m, StackedBlocks::From(m, -1e-3, 0.0, 0.1));
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(run.summary.where, m.elements[0].name);
+}
+
 TEST(PiecewiseElements, PiecesChangeAtCorners) {
   const ForceElement stop{
       .name = "s",

@@ -140,5 +140,29 @@ TEST(StateLoads, ThatAreNotFiniteAreNamed) {
   }
 }
 
+TEST(StateForces, MoveAFreeBarAsTheSpringAndTheDamperDo) {
+  const Mechanism plain = MakePivotedBar();
+  Mechanism sprung = plain;
+  sprung.elements = {{.name = "k", .joint = 0, .law = SpringLaw{{3.0}, 0.4}},
+                     {.name = "c", .joint = 0, .law = DampingLaw{0.2}}};
+  Motion motion = FreeMotion(plain, 0.1, 1.0, 1.0);
+  const ForwardRun spring = RunForwardReference(sprung, motion);
+  motion.forces[0].following = Follower(3.0, 0.2, 0.0).following[0].function;
+  const ForwardRun driven = RunForwardReference(plain, motion);
+  ASSERT_TRUE(driven.summary.ok()) << driven.summary.message;
+  const VecX difference =
+      ColumnOf(driven.trace, "motor.position") - ColumnOf(spring.trace, "motor.position");
+  EXPECT_LT(difference.cwiseAbs().maxCoeff(), 1e-12);
+  // Its work is the drive's.
+  const VecX balance = ColumnOf(driven.trace, "energy.kinetic") +
+                       ColumnOf(driven.trace, "energy.gravity") -
+                       ColumnOf(driven.trace, "motor.work");
+  EXPECT_LT((balance.array() - balance[0]).abs().maxCoeff(), 1e-11);
+  motion.forces[0].following = NotFiniteBeyond(0.3, true).following[0].function;
+  const ForwardRun ended = RunForwardReference(plain, motion);
+  EXPECT_EQ(ended.summary.where, "forces.motor");
+  EXPECT_NE(ended.summary.message.find("pivot.position = "), std::string::npos);
+}
+
 }  // namespace
 }  // namespace mbv::fixtures

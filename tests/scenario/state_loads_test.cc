@@ -43,6 +43,51 @@ TEST(StateLoads, PlainNumbersStayProfiles) {
   EXPECT_TRUE(result.scenario->motion.loads.at(0).following.empty());
 }
 
+ScenarioResult WithForce(const std::string& force) {
+  const std::string text = std::string("mechanism: ") + kSourceDir +
+                           "/models/four_bar/model.yaml\n"
+                           "motion: {duration_s: 1, initial: {motor: home}}\n"
+                           "forces: {motor: \"" +
+                           force + "\"}\nanalytic: none\n";
+  return LoadScenarioText(text, "s.yaml");
+}
+
+TEST(StateForces, AreExpressionsToo) {
+  const ScenarioResult result = WithForce("-2*motor.velocity + t");
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const DriveForce& force = result.scenario->motion.forces.at(0);
+  ASSERT_TRUE(force.following.has_value());
+  EXPECT_EQ(force.following->value(3.0, std::vector<double>{0.5}), 2.0);
+  EXPECT_FALSE(WithForce("2*crank").scenario->motion.forces.at(0).following.has_value());
+  EXPECT_NE(WithForce("-2*moter.velocity").diagnostics.Text().find("did you mean 'motor.velocity'"),
+            std::string::npos);
+}
+
+TEST(StateFunctions, MayNameTheirParts) {
+  const auto with = [](const std::string& variables, const std::string& moment) {
+    return LoadScenarioText(std::string("mechanism: ") + kSourceDir +
+                                "/models/four_bar/model.yaml\n"
+                                "motion: {duration_s: 1, commands: {motor: home}}\n"
+                                "variables: " +
+                                variables + "\nloads: {l: {on: crank, moment: [0, 0, \"" + moment +
+                                "\"]}}\nanalytic: none\n",
+                            "s.yaml");
+  };
+  const ScenarioResult result =
+      with("{swing: motor.position - 0.5, pull: 3*swing + t}", "-2*pull*motor.velocity");
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const StateFunction& f = result.scenario->motion.loads.at(0).following.at(0).function;
+  EXPECT_DOUBLE_EQ(f.value(0.25, std::vector<double>{0.75, 2.0}), -2.0 * (3.0 * 0.25 + 0.25) * 2.0);
+  const auto findings = [&](const std::string& variables, const std::string& moment) {
+    return with(variables, moment).diagnostics.Text();
+  };
+  EXPECT_NE(findings("{a: b + 1, b: a}", "a").find("refers to itself"), std::string::npos);
+  EXPECT_NE(findings("{t: 1}", "t").find("variables.t: t is the time"), std::string::npos);
+  EXPECT_NE(findings("{crank: 1}", "t").find("is a parameter"), std::string::npos);
+  EXPECT_NE(findings("{a: moter.position}", "a").find("did you mean 'motor.position'"),
+            std::string::npos);
+}
+
 TEST(StateLoads, UnknownNamesAreFindings) {
   EXPECT_NE(WithLoad("-2*moter.position")
                 .diagnostics.Text()

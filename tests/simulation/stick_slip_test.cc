@@ -189,6 +189,65 @@ TEST(SimulatedPieces, AStopWithDissipationLosesWhatItsIntegralSays) {
   EXPECT_NEAR(last("dampers.work"), 0.5 * mass * (v * v - v0 * v0), 1e-7);
 }
 
+TEST(SimulatedPieces, CurvesAtRatesAndExpressionsAreTheSpringAndDamperThatTheyDescribe) {
+  const double mass = 2.0, k = 80.0, v0 = 1.5, c = 4.0, decay = c / (2.0 * mass);
+  const double w = std::sqrt(k / mass - decay * decay);
+  const auto swing = [&](double t) { return v0 / w * std::exp(-decay * t) * std::sin(w * t); };
+  Mechanism m = StackedBlocks{{mass}, {CoulombFriction(0.0)}}.Make();
+  const auto error = [&](double damping, bool as_curves) {
+    CurvesLaw law{.rates = {-2.0, 0.5, 3.0}, .curves = {}};
+    for (const double rate : law.rates) {
+      law.curves.push_back({.knots = {{-0.05, 0.05 * k - damping * rate, -k, -k},
+                                      {0.02, -0.02 * k - damping * rate, -k, -k}}});
+    }
+    m.elements[0].law = law;
+    if (!as_curves) {
+      m.elements[0].law = ExpressionLaw{
+          .text = "", .force = [=](double x, double v) { return -k * x - damping * v; }};
+    }
+    const SimulationRun run = SlipFreely(m, StackedBlocks::From(m, 0.0, v0, 0.6), 5e-4);
+    EXPECT_TRUE(run.summary.ok()) << run.summary.message;
+    return Farthest(run.trace, "motor1.position", swing);
+  };
+  for (const bool as_curves : {true, false}) {
+    EXPECT_LT(error(c, as_curves), 1e-10);
+    EXPECT_GT(error(c * (1.0 + 1e-6), as_curves), 1e-8);
+  }
+}
+
+TEST(SimulatedRigidStops, ABlockBouncesAsItsClosedFormAndRests) {
+  const BouncingBlock block;
+  Mechanism m = block.Make();
+  const auto error = [&] {
+    const SimulationRun run = SlipFreely(m, BouncingBlock::Thrown(m, 1.0), 1e-3);
+    EXPECT_TRUE(run.summary.ok()) << run.summary.message;
+    const double energy = 0.5 * block.mass * block.v0 * block.v0;
+    EXPECT_NEAR(run.trace.values(run.trace.values.rows() - 1, run.trace.Find("dampers.work")),
+                -energy, 1e-5 * energy);
+    return Farthest(run.trace, "motor1.position", [&](double t) { return block.Position(t); });
+  };
+  EXPECT_LT(error(), 1e-11);
+  m = BouncingBlock{.restitution = 0.6 * (1.0 + 1e-6)}.Make();
+  EXPECT_GT(error(), 1e-8);
+}
+
+TEST(SimulatedRigidStops, WhatLeansLeavesWhereItWouldBePulled) {
+  const RatchetedBlock ratchet;
+  Mechanism m = ratchet.Make();
+  m.elements[0].law = StopLaw{.lower = 0.0, .restitution = 0.0};
+  const double duration_s = ratchet.start() + ratchet.moves();
+  const SimulationRun run = SlipFreely(m, ratchet.Pushed(m, duration_s), 1e-3);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_LT(Farthest(run.trace, "motor1.position",
+                     [&](double t) {
+                       return t < ratchet.start() ? 0.0 : ratchet.Way(t - ratchet.start());
+                     }),
+            1e-9);
+  const SimulationRun stock = SlipFreely(m, ratchet.Pushed(m, 0.1), 1e-3, Engine::kStock);
+  EXPECT_EQ(stock.summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(stock.summary.where, m.elements[0].name);
+}
+
 // Events leave the order of the scheme: a quarter of the step, far less than a sixteenth.
 TEST(SimulatedStickSlip, ConvergesWithTheStep) {
   const FrictionLaw law{.coulomb = 1.0, .breakaway = 2.0, .stribeck_rate = 0.3};

@@ -1063,6 +1063,33 @@ class Prover {
     return true;
   }
 
+  static bool ForceOnCurves(const CurvesLaw& law, const Series<T>& x, T* force) {
+    size_t i = 0;
+    while (i < law.rates.size() && Below(x.r) >= law.rates[i]) ++i;
+    if (i < law.rates.size() && Above(x.r) > law.rates[i]) return false;
+    const size_t last = law.rates.size() - 1, up = std::clamp<size_t>(i, 1, last);
+    T low(0), high(0);
+    if (!ForceOnCurve(law.curves[up - 1], x.v, &low)) return false;
+    if (!ForceOnCurve(law.curves[up], x.v, &high)) return false;
+    const T t = (x.r - T(law.rates[up - 1])) / (T(law.rates[up]) - T(law.rates[up - 1]));
+    *force = T(T(1) - t) * low + t * high;
+    if (law.held && i == 0) *force = low;
+    if (law.held && i > last) *force = high;
+    return true;
+  }
+
+  // As Followed().
+  static T ForceBy(const ExpressionLaw& law, const Series<T>& x) {
+    const double q = Nearest(x.v), v = Nearest(x.r);
+    T force(law.force(q, v));
+    if constexpr (kIsDual<T>) {
+      constexpr double kReach = 0.1;
+      force.d += Slope(x.v) * SlopeAt([&](double at) { return law.force(at, v); }, q, kReach) +
+                 Slope(x.r) * SlopeAt([&](double at) { return law.force(q, at); }, v, kReach);
+    }
+    return force;
+  }
+
   std::string ApplyElement(size_t e) {
     using std::exp;
     const ForceElement& element = mechanism().elements[e];
@@ -1100,6 +1127,13 @@ class Prover {
         return fmt::format("not provable: on which side of a knot '{}' is, is open", element.name);
       }
       force = share * force;
+    } else if (const auto* curves = std::get_if<CurvesLaw>(&element.law)) {
+      if (!ForceOnCurves(*curves, x, &force)) {
+        return fmt::format("not provable: on which side of a knot '{}' is, is open", element.name);
+      }
+      force = share * force;
+    } else if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
+      force = share * ForceBy(*expression, x);
     } else if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
       const double rest = RestRate(mechanism(), element, motion_.duration_s);
       const double low = Below(x.r), high = Above(x.r);
@@ -1493,6 +1527,12 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
     certificate.left_out.push_back(fmt::format(
         "load '{}' is an expression: its own rounding, in doubles, is not in the bounds",
         load.name));
+  }
+  for (const ForceElement& element : mechanism.elements) {
+    if (!std::holds_alternative<ExpressionLaw>(element.law)) continue;
+    certificate.left_out.push_back(fmt::format(
+        "element '{}' is an expression: its own rounding, in doubles, is not in the bounds",
+        element.name));
   }
   certificate.left_out.emplace_back(
       "which of several assembly modes is meant: the one of the reference's pose is proved");

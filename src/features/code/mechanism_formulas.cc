@@ -948,7 +948,9 @@ class FormulaMaker {
         continue;
       }
       if (element.spring >= 0 || std::holds_alternative<StopLaw>(element.law) ||
-          std::holds_alternative<CurveLaw>(element.law)) {
+          std::holds_alternative<CurveLaw>(element.law) ||
+          std::holds_alternative<CurvesLaw>(element.law) ||
+          std::holds_alternative<ExpressionLaw>(element.law)) {
         Unsupported("there is a " + Described(m_, element));
         continue;
       }

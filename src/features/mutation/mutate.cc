@@ -423,7 +423,8 @@ bool SameLaw(const SpringLaw& a, const SpringLaw& b) {
 bool SameLaw(const StopLaw& a, const StopLaw& b) {
   return a.lower == b.lower && a.upper == b.upper && Same(a.stiffness, b.stiffness) &&
          Same(a.exponent, b.exponent) && Same(a.damping, b.damping) &&
-         Same(a.dissipation, b.dissipation);
+         Same(a.dissipation, b.dissipation) && a.rigid() == b.rigid() &&
+         (!a.rigid() || Same(a.restitution, b.restitution));
 }
 bool SameLaw(const CurveLaw& a, const CurveLaw& b) {
   const auto same = [](const CurveLaw::Knot& x, const CurveLaw::Knot& y) {
@@ -432,6 +433,13 @@ bool SameLaw(const CurveLaw& a, const CurveLaw& b) {
   };
   return a.of_rate == b.of_rate && std::ranges::equal(a.knots, b.knots, same);
 }
+bool SameLaw(const CurvesLaw& a, const CurvesLaw& b) {
+  const auto same_rate = [](double x, double y) { return Same(x, y); };
+  const auto same_curve = [](const CurveLaw& x, const CurveLaw& y) { return SameLaw(x, y); };
+  return a.held == b.held && std::ranges::equal(a.rates, b.rates, same_rate) &&
+         std::ranges::equal(a.curves, b.curves, same_curve);
+}
+bool SameLaw(const ExpressionLaw& a, const ExpressionLaw& b) { return a.text == b.text; }
 bool SameLaw(const RotorLaw& a, const RotorLaw& b) {
   const auto momentum = [](const RotorLaw& law) -> Vec3 {
     if (!law.carrier) return Vec3::Zero();

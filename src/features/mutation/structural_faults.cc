@@ -125,11 +125,24 @@ class Collector {
     if (auto* stop = std::get_if<StopLaw>(&element->law)) {
       std::tie(stop->lower, stop->upper) = std::pair(-stop->upper, -stop->lower);
     }
-    if (auto* curve = std::get_if<CurveLaw>(&element->law)) {
+    const auto reverse = [](CurveLaw* curve) {
       for (CurveLaw::Knot& knot : curve->knots) {
         knot = {-knot.at, -knot.force, knot.slope_after, knot.slope_before};
       }
       std::ranges::reverse(curve->knots);
+    };
+    if (auto* curve = std::get_if<CurveLaw>(&element->law)) reverse(curve);
+    if (auto* curves = std::get_if<CurvesLaw>(&element->law)) {
+      for (CurveLaw& curve : curves->curves) reverse(&curve);
+      for (double& rate : curves->rates) rate = -rate;
+      std::ranges::reverse(curves->rates);
+      std::ranges::reverse(curves->curves);
+    }
+    if (auto* expression = std::get_if<ExpressionLaw>(&element->law)) {
+      expression->text = "the other way round: " + expression->text;
+      expression->force = [force = expression->force](double x, double v) {
+        return -force(-x, -v);
+      };
     }
     if (IsGyroscopic(*element)) std::get<RotorLaw>(element->law).ratio *= -1.0;
     if (spring == nullptr) return;
@@ -138,8 +151,15 @@ class Collector {
     for (size_t i = 1; i < spring->polynomial.size(); i += 2) spring->polynomial[i] *= -1.0;
   }
 
-  // The force of a preload or a curve acts the other way, that of a stop grows with the depth
-  // alone; a gear turns a rotor as if its inertia grew with the ratio and not with its square.
+  static void TurnRound(CurveLaw* curve) {
+    for (CurveLaw::Knot& knot : curve->knots) {
+      knot = {knot.at, -knot.force, -knot.slope_before, -knot.slope_after};
+    }
+  }
+
+  // The force of a preload, a curve or an expression acts the other way, that of a stop grows with
+  // the depth alone; a gear turns a rotor as if its inertia grew with the ratio and not with its
+  // square.
   void WrongElements() {
     std::map<std::string, size_t> preloaded, geared, curved, stopped;
     for (size_t e = 0; e < m_.elements.size(); ++e) {
@@ -151,10 +171,18 @@ class Collector {
         Add("preload the other way", element.name, std::move(wrong));
       } else if (std::holds_alternative<CurveLaw>(element.law)) {
         if (!IsFirst(&curved, element.name)) continue;
-        for (CurveLaw::Knot& knot : std::get<CurveLaw>(wrong.elements[e].law).knots) {
-          knot = {knot.at, -knot.force, -knot.slope_before, -knot.slope_after};
-        }
+        TurnRound(&std::get<CurveLaw>(wrong.elements[e].law));
         Add("curve the other way", element.name, std::move(wrong));
+      } else if (std::holds_alternative<CurvesLaw>(element.law)) {
+        if (!IsFirst(&curved, element.name)) continue;
+        for (CurveLaw& curve : std::get<CurvesLaw>(wrong.elements[e].law).curves) TurnRound(&curve);
+        Add("curve the other way", element.name, std::move(wrong));
+      } else if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
+        if (!IsFirst(&curved, element.name)) continue;
+        wrong.elements[e].law = ExpressionLaw{
+            .text = "-(" + expression->text + ")",
+            .force = [force = expression->force](double x, double v) { return -force(x, v); }};
+        Add("expression the other way", element.name, std::move(wrong));
       } else if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
         if (stop->exponent == 1.0 || !IsFirst(&stopped, element.name)) continue;
         std::get<StopLaw>(wrong.elements[e].law).exponent = 1.0;

@@ -323,8 +323,17 @@ double ConstraintSystem::FrictionUnit(int row) const {
   return place.tendon >= 0 ? length_ : dof_unit_[place.dof];
 }
 
+namespace {
+
+// What a rigid stop may exert where it holds [N or N m].
+constexpr double kUnyielding = 1e20;
+
+}  // namespace
+
 double ConstraintSystem::Breakaway(size_t element) const {
-  const auto& law = std::get<FrictionLaw>(engine_.mechanism->elements[element].law);
+  const ForceElement& at = engine_.mechanism->elements[element];
+  if (IsRigidStop(at)) return kUnyielding;
+  const auto& law = std::get<FrictionLaw>(at.law);
   return engaged(element) * law.half_band() + load_friction(element);
 }
 

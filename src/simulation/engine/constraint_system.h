@@ -159,7 +159,7 @@ class ConstraintSystem {
   /// rate says.
   void SetSliding(std::vector<int> sign) { sliding_ = std::move(sign); }
   [[nodiscard]] const std::vector<int>& sliding() const { return sliding_; }
-  /// Of an element with dry friction, by its joint's load too.
+  /// Of an element with dry friction, by its joint's load too; of a rigid stop far beyond any.
   [[nodiscard]] double Breakaway(size_t element) const;
   /// Sum of the breakaway forces of what a row holds.
   [[nodiscard]] double HeldLoss(int row) const;

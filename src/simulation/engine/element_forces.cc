@@ -128,7 +128,8 @@ RunSummary FrictionUnsupported(const EngineModel& engine, size_t e, const std::s
 // In free motion MuJoCo's rows hold friction at rest; by itself MuJoCo lets them do all of it.
 void AddHolding(const ConstraintSystem& system, size_t e, ElementMotion* at) {
   if (system.friction_rows() == 0 || system.engine().elements[e].prescribed) return;
-  if (!HasFriction(system.engine().mechanism->elements[e])) return;
+  const ForceElement& element = system.engine().mechanism->elements[e];
+  if (!HasFriction(element) && !IsRigidStop(element)) return;
   at->sliding = system.sliding().empty() ? 0 : system.sliding()[e];
   at->rests = at->sliding == 0;
   if (at->rests) at->held = system.HeldForce(e);
@@ -213,6 +214,15 @@ double CurveIntegral(const CurveLaw& law, double x) {
   return sum + piece(from, x);
 }
 
+// Weights of the curves at the two rates around v fall linearly with the distance.
+double OfCurves(const CurvesLaw& law, double x, double v) {
+  const double at = law.held ? std::clamp(v, law.rates.front(), law.rates.back()) : v;
+  size_t low = law.rates.size() - 2;
+  while (low > 0 && at < law.rates[low]) --low;
+  const double below = OfCurve(law.curves[low], x), above = OfCurve(law.curves[low + 1], x);
+  return below + (above - below) * (at - law.rates[low]) / (law.rates[low + 1] - law.rates[low]);
+}
+
 // Σ_i c_i x^(i+1)
 double PowerSum(const std::vector<double>& c, double x) {
   double sum = 0.0, power = x;
@@ -287,9 +297,16 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     const int sign = at.sliding != 0 ? at.sliding : at.rate > 0.0 ? 1 : -1;
     return at.load_force - friction->sense(sign) * most - sign * at.load_friction;
   }
+  if (IsRigidStop(element)) return at.held;
   if (const auto* stop = std::get_if<StopLaw>(&element.law)) return -OfStop(*stop, at).whole;
   if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
     return at.engaged * OfCurve(*curve, curve->of_rate ? at.rate : at.position);
+  }
+  if (const auto* curves = std::get_if<CurvesLaw>(&element.law)) {
+    return at.engaged * OfCurves(*curves, at.position, at.rate);
+  }
+  if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
+    return at.engaged * expression->force(at.position, at.rate);
   }
   const auto& rotor = std::get<RotorLaw>(element.law);
   return -rotor.reflected() * at.acceleration - rotor.inertia * rotor.ratio * at.turning.along_rate;
@@ -321,7 +338,9 @@ bool Dissipates(const ForceElement& element) {
   const auto* curve = std::get_if<CurveLaw>(&element.law);
   return std::holds_alternative<DampingLaw>(element.law) ||
          std::holds_alternative<FrictionLaw>(element.law) ||
-         std::holds_alternative<StopLaw>(element.law) || (curve != nullptr && curve->of_rate);
+         std::holds_alternative<StopLaw>(element.law) || (curve != nullptr && curve->of_rate) ||
+         std::holds_alternative<CurvesLaw>(element.law) ||
+         std::holds_alternative<ExpressionLaw>(element.law);
 }
 
 double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
@@ -352,6 +371,7 @@ ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
 ElementSlope SlopeOf(const ForceElement& element, double position) {
   if (const auto* damping = std::get_if<DampingLaw>(&element.law)) return {0.0, damping->damping};
   if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
+    if (stop->rigid()) return {};
     if (stop->exponent == 1.0) return {stop->stiffness, stop->damping};  // before it is met, too
     const double depth = std::abs(position - std::clamp(position, stop->lower, stop->upper));
     if (depth == 0.0) return {};
@@ -364,6 +384,25 @@ ElementSlope SlopeOf(const ForceElement& element, double position) {
       steepest = std::max({steepest, -knot.slope_before, -knot.slope_after});
     }
     return curve->of_rate ? ElementSlope{0.0, steepest} : ElementSlope{steepest, 0.0};
+  }
+  if (const auto* curves = std::get_if<CurvesLaw>(&element.law)) {
+    ElementSlope most;
+    for (size_t i = 0; i < curves->curves.size(); ++i) {
+      const std::vector<CurveLaw::Knot>& knots = curves->curves[i].knots;
+      for (size_t k = 0; k < knots.size(); ++k) {
+        most.stiffness = std::max({most.stiffness, -knots[k].slope_before, -knots[k].slope_after});
+        if (i == 0) continue;
+        const double fall = curves->curves[i - 1].knots[k].force - knots[k].force;
+        most.damping = std::max(most.damping, fall / (curves->rates[i] - curves->rates[i - 1]));
+      }
+    }
+    return most;
+  }
+  if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
+    const double reach = 1e-4;  // central differences, for an estimate [m or rad, per second]
+    const auto& F = expression->force;
+    return {std::max(0.0, (F(position - reach, 0.0) - F(position + reach, 0.0)) / (2.0 * reach)),
+            std::max(0.0, (F(position, -reach) - F(position, reach)) / (2.0 * reach))};
   }
   const auto* spring = std::get_if<SpringLaw>(&element.law);
   if (spring == nullptr) return {};
@@ -380,6 +419,16 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
   const bool released = motion.free() || IsReleased(engine);
   for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
+    if (released && IsRigidStop(element) && (!motion.free() || !own_events)) {
+      return FrictionUnsupported(engine, e,
+                                 own_events ? "what hits it leaves the commanded motion"
+                                            : "MuJoCo's own stops yield; the corrected engine "
+                                              "exerts impulses");
+    }
+    if (released && IsGyroscopic(element) &&
+        std::ranges::any_of(engine.mechanism->elements, IsRigidStop)) {
+      return FrictionUnsupported(engine, e, "with rigid stops it is not simulated");
+    }
     if (released && HasFriction(element)) {
       const std::string why = engine.elements[e].turned >= 0 && !own_events
                                   ? "MuJoCo's ball has other axes than the joint's frame on its "
@@ -435,7 +484,7 @@ void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceler
     if (mjcf::IsPlanned(elements[e])) continue;
     const ElementPlace& place = engine.elements[e];
     ElementMotion at = ElementMotionOf(system, e);
-    if (at.rests && HasFriction(elements[e])) at.held = 0.0;  // unknown, or MuJoCo's own
+    at.held = 0.0;  // unknown, or MuJoCo's own
     if (elements[e].drive >= 0 && elements[e].drive < driven_acceleration.size()) {
       at.acceleration = driven_acceleration[elements[e].drive];
     }

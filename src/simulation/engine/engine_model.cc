@@ -301,11 +301,12 @@ void AddFrictionRows(EngineModel* engine) {
   for (int t = 0; t < m.ntendon; ++t) places.push_back({.tendon = t, .elements = {}});
   for (size_t e = 0; e < engine->elements.size(); ++e) {
     const ElementPlace& place = engine->elements[e];
-    if (place.prescribed || !HasFriction(engine->mechanism->elements[e])) continue;
+    const ForceElement& element = engine->mechanism->elements[e];
+    if (place.prescribed || (!HasFriction(element) && !IsRigidStop(element))) continue;
     const int at = place.tendon >= 0 ? m.nv + place.tendon : place.dof;
-    const auto& law = std::get<FrictionLaw>(engine->mechanism->elements[e].law);
+    const auto* law = std::get_if<FrictionLaw>(&element.law);
     // Without a loss there is no row; that by the load is written into it at every node.
-    const double loss = law.breakaway > 0.0 ? law.breakaway : 1.0;
+    const double loss = law != nullptr && law->breakaway > 0.0 ? law->breakaway : 1.0;
     (place.tendon >= 0 ? m.tendon_frictionloss[place.tendon] : m.dof_frictionloss[place.dof]) +=
         loss;
     places[static_cast<size_t>(at)].elements.push_back(e);

@@ -44,7 +44,7 @@ struct EngineModel;
 /// Whether an element acts on a ball or a free joint of MuJoCo.
 [[nodiscard]] bool IsOfRoundJoint(const EngineModel& engine, size_t element);
 
-/// A row of MuJoCo's frictionloss, and the elements with dry friction there.
+/// A row of MuJoCo's frictionloss, and the elements with dry friction and rigid stops there.
 struct FrictionPlace {
   int dof = -1, tendon = -1;  ///< one of both
   std::vector<size_t> elements;
@@ -108,8 +108,9 @@ void LeaveOutShapes(EngineModel* engine);
 /// What counts as rest in a motion of this length, for every force element.
 void SetRestRates(double duration_s, EngineModel* engine);
 
-/// Gives MuJoCo rows of frictionloss where elements have dry friction on a coordinate that is not
-/// prescribed, with the breakaway forces as losses. To be called before the data is made.
+/// Gives MuJoCo rows of frictionloss where elements have dry friction, or are rigid stops, on a
+/// coordinate that is not prescribed, with the breakaway forces as losses. To be called before the
+/// data is made.
 void AddFrictionRows(EngineModel* engine);
 
 /// True if the motion of some drive is not prescribed.

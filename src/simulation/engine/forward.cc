@@ -34,6 +34,12 @@ namespace {
 // loops and commands, G_r what rests or stops, ẋ what is commanded, G_e has the rate
 //   q̇_e = G_e (v − e),  (J; G_r) e = (J v − ẋ; G_r v), e of least norm                          (1)
 // in which that is taken out: what (1) leaves is motion, however large the step.
+//
+// A rigid stop is hit where its gap would close. With MuJoCo's M, rows J of loops and commands and
+// the gradients G of what is hit or in touch
+//   M Δv = Jᵀλ + Gᵀp,  J Δv = 0,  G Δv = −(1 + ε) G v where it is hit, 0 in touch               (2)
+// What then stays in touch is held by a row of MuJoCo like friction at rest, and let go where that
+// would pull.
 
 class StickSlip {
  public:
@@ -55,8 +61,11 @@ class StickSlip {
  private:
   struct Event {
     double after_s = 0.0;
-    std::vector<size_t> stops;
-    std::vector<std::pair<size_t, int>> starts;  ///< elements and signs
+    std::vector<size_t> stops = {};
+    std::vector<std::pair<size_t, int>> starts = {};  ///< elements and signs
+    std::vector<std::pair<size_t, int>> hits = {};    ///< rigid stops, and which end: 1 or −1
+    std::vector<size_t> leaves = {};                  ///< of those in touch
+    [[nodiscard]] bool of_stops() const { return !hits.empty() || !leaves.empty(); }
   };
   [[nodiscard]] RunSummary SwitchOver(const Step& step);
   [[nodiscard]] bool IsOff(size_t element) const {
@@ -83,6 +92,16 @@ class StickSlip {
   [[nodiscard]] double RateAfter(const Integrator::Node& node, size_t element, double from_s,
                                  double h);
   [[nodiscard]] double Moving(size_t element) const;
+  [[nodiscard]] double GapTo(size_t element, int side) const;
+  [[nodiscard]] bool IsBeyond(size_t element, int side) const;
+  [[nodiscard]] bool Pulls(size_t element) const;
+  [[nodiscard]] RunSummary BeginStops();
+  [[nodiscard]] RunSummary Strike(const std::vector<std::pair<size_t, int>>& hits, double t_s);
+  [[nodiscard]] RunSummary LeaveStops(double t_s);
+  /// The time from which on it holds, where it does at the end.
+  template <typename Holds>
+  [[nodiscard]] double TimeOf(const Integrator::Node& node, double from_s, double h,
+                              const Holds& holds);
   /// Into the trace.
   void NoteEvents(double t_s);
 
@@ -96,6 +115,8 @@ class StickSlip {
   std::vector<size_t> corners_;  ///< elements whose law has corners
   std::vector<int> pieces_;      ///< of these, at the present node
   std::vector<double> rates_;    ///< of these, by (1)
+  std::vector<std::pair<size_t, int>> ends_;  ///< of rigid stops
+  std::vector<int> touch_;                    ///< per element: the end in touch, or 0
   EventLog log_;
   RunSummary trouble_ = RunSummary::Done();
   int uniform_ = 4;  ///< nodes since the last event, as in Step
@@ -115,7 +136,9 @@ constexpr int kHalvings = 40, kPassesToRoot = 80;
 // Where a held coordinate starts is the zero of its acceleration, extrapolated from this share of
 // the step behind it.
 constexpr double kBehind = 1e-3;
-constexpr int kMostRounds = 40, kMostEvents = 200;  // at one node, in one step
+constexpr int kMostRounds = 40, kMostEvents = 1000;  // at one node, in one step
+// A gap is open within this [characteristic lengths, rad].
+constexpr double kTouches = 1e-12;
 
 StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command)
     : s_(*session), integrator_(*integrator), command_(std::move(command)) {
@@ -126,8 +149,15 @@ StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command
   }
   const bool moves_by_forces = s_.motion.free() || IsReleased(s_.engine);
   for (size_t e = 0; e < elements.size() && moves_by_forces; ++e) {
-    if (HasCorners(elements[e])) corners_.push_back(e);
+    if (!IsRigidStop(elements[e])) {
+      if (HasCorners(elements[e])) corners_.push_back(e);
+      continue;
+    }
+    const auto& stop = std::get<StopLaw>(elements[e].law);
+    if (std::isfinite(stop.upper)) ends_.emplace_back(e, 1);
+    if (std::isfinite(stop.lower)) ends_.emplace_back(e, -1);
   }
+  touch_.assign(elements.size(), 0);
   sliding_.assign(elements.size(), 0);
   fresh_.assign(elements.size(), 0);
 }
@@ -141,6 +171,7 @@ void StickSlip::FindDirection(size_t e) {
 void StickSlip::FindSliding(const Step& first) {
   off_ = SwitchedOff(s_.motion, first.from_s, s_.until(first.to_s));
   for (const size_t e : friction_elements_) FindDirection(e);
+  for (const auto& [e, side] : ends_) sliding_[e] = 1;
   s_.system.SetSliding(sliding_);
 }
 
@@ -155,7 +186,139 @@ RunSummary StickSlip::Begin() {
   pieces_ = Pieces();
   RunSummary summary = LetGo(0.0);
   NoteEvents(0.0);
+  if (!summary.ok() || ends_.empty()) return summary;
+  summary = BeginStops();
+  NoteEvents(0.0);
   return summary;
+}
+
+double StickSlip::GapTo(size_t e, int side) const {
+  const auto& stop = std::get<StopLaw>(s_.engine.mechanism->elements[e].law);
+  const double q = ElementMotionOf(s_.system, e).position;
+  return side > 0 ? stop.upper - q : q - stop.lower;
+}
+
+bool StickSlip::IsBeyond(size_t e, int side) const {
+  const Mechanism& mechanism = *s_.engine.mechanism;
+  const double unit = ActsOnLength(mechanism, mechanism.elements[e]) ? s_.system.length() : 1.0;
+  return touch_[e] != side && GapTo(e, side) < -kTouches * unit;
+}
+
+// Its row pushes towards larger values.
+bool StickSlip::Pulls(size_t e) const {
+  return touch_[e] != 0 && touch_[e] * s_.system.HeldForce(e) > 0.0;
+}
+
+// What is in touch at the start stays there or is hit; the reference refuses starts beyond an end.
+RunSummary StickSlip::BeginStops() {
+  std::vector<std::pair<size_t, int>> hits;
+  const Mechanism& mechanism = *s_.engine.mechanism;
+  for (const auto& [e, side] : ends_) {
+    const double unit = ActsOnLength(mechanism, mechanism.elements[e]) ? s_.system.length() : 1.0;
+    const double rate = -side * ElementMotionOf(s_.system, e).rate;
+    if (GapTo(e, side) <= kTouches * unit && rate <= s_.engine.elements[e].rest_rate) {
+      hits.emplace_back(e, side);
+    }
+  }
+  if (hits.empty()) return RunSummary::Done();
+  if (RunSummary summary = Strike(hits, 0.0); !summary.ok()) return summary;
+  return LeaveStops(0.0);
+}
+
+// (2)
+RunSummary StickSlip::Strike(const std::vector<std::pair<size_t, int>>& hits, double t_s) {
+  const mjModel* m = s_.engine.m.get();
+  const int nv = s_.system.nv(), rows = s_.system.rows();
+  std::vector<std::pair<size_t, int>> all = hits;
+  for (const auto& [e, side] : ends_) {
+    if (touch_[e] == side) all.emplace_back(e, side);
+  }
+  RowMajor M(nv, nv);
+  mj_fullM(m, M.data(), s_.data->qM);
+  const VecX unit = s_.system.dof_unit(), v = Eigen::Map<const VecX>(s_.data->qvel, nv);
+  const MatX scaled = unit.asDiagonal() * M * unit.asDiagonal();
+  const auto count = static_cast<Eigen::Index>(all.size());
+  const Eigen::Index size = nv + rows + count;
+  MatX K = MatX::Zero(size, size);
+  VecX change = VecX::Zero(size);
+  std::vector<double> closing;
+  std::vector<bool> rested;
+  K.topLeftCorner(nv, nv) = scaled / scaled.diagonal().maxCoeff();
+  K.block(nv, 0, rows, nv) = s_.system.ScaledJ();
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const auto& [e, side] = all[static_cast<size_t>(k)];
+    const VecX G = -side * ElementGradient(s_.system, e).cwiseProduct(unit);
+    const double largest = std::max(G.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
+    const double rate = -side * ElementMotionOf(s_.system, e).rate;
+    const double rebound =
+        -std::get<StopLaw>(s_.engine.mechanism->elements[e].law).restitution * rate;
+    const bool is_hit = k < static_cast<Eigen::Index>(hits.size());
+    const bool rests = !is_hit || std::abs(rebound) <= s_.engine.elements[e].rest_rate;
+    K.block(nv + rows + k, 0, 1, nv) = G.transpose() / largest;
+    change[nv + rows + k] = ((rests ? 0.0 : rebound) - rate) / largest;
+    closing.push_back(is_hit ? -rate : 0.0);
+    rested.push_back(is_hit && rests);
+  }
+  K.topRightCorner(nv, rows + count) = -K.bottomLeftCorner(rows + count, nv).transpose();
+  const VecX found = Eigen::CompleteOrthogonalDecomposition<MatX>(K).solve(change);
+  const VecX impulse = found.tail(count);
+  for (size_t k = 0; k < all.size(); ++k) {
+    const auto& [e, side] = all[k];
+    const double part = impulse[static_cast<Eigen::Index>(k)];
+    if (part >= -kStarts * impulse.cwiseAbs().maxCoeff()) continue;
+    if (k >= hits.size()) {  // what is in touch is not pulled: without it
+      touch_[e] = 0, sliding_[e] = 1;
+      return Strike(hits, t_s);
+    }
+    if (closing[k] <= s_.engine.elements[e].rest_rate) continue;
+    return {.stop = Stop::kNoConvergence,
+            .message = fmt::format("rigid stop '{}' and others are hit at once, and the order is "
+                                   "not determined, at t = {:.6g} s",
+                                   s_.engine.mechanism->elements[e].name, t_s),
+            .time_s = t_s,
+            .where = s_.engine.mechanism->elements[e].name,
+            .names_where = true,
+            .states_time = true};
+  }
+  for (size_t k = 0; k < hits.size(); ++k) {
+    const auto& [e, side] = hits[k];
+    if (rested[k]) touch_[e] = side, sliding_[e] = 0;
+    if (closing[k] <= s_.engine.elements[e].rest_rate) continue;
+    log_.Add(s_.engine.mechanism->elements[e], t_s,
+             side > 0 ? Happening::kHitsUpper : Happening::kHitsLower);
+  }
+  const VecX dv = found.head(nv).cwiseProduct(unit);
+  s_.work.Add(0.5 * ((v + dv).dot(M * (v + dv)) - v.dot(M * v)));
+  integrator_.Strike(dv);
+  return Jump(t_s);
+}
+
+// Those that would pull are let go; what is in touch and accelerates away, too.
+RunSummary StickSlip::LeaveStops(double t_s) {
+  for (int pass = 0; pass < kMostRounds; ++pass) {
+    bool changed = false;
+    for (const auto& [e, side] : ends_) {
+      if (touch_[e] != side || !Pulls(e)) continue;
+      touch_[e] = 0, sliding_[e] = 1;
+      changed = true;
+    }
+    if (!changed) return RunSummary::Done();
+    if (RunSummary summary = Jump(t_s); !summary.ok()) return summary;
+  }
+  return RunSummary::Done();
+}
+
+template <typename Holds>
+double StickSlip::TimeOf(const Integrator::Node& node, double from_s, double h,
+                         const Holds& holds) {
+  double before = 0.0, beyond = h;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double t = 0.5 * (before + beyond);
+    integrator_.Restore(node);
+    if (RunSummary summary = Go(from_s, t, false); !summary.ok()) trouble_ = summary;
+    (holds() ? beyond : before) = t;
+  }
+  return beyond;
 }
 
 void StickSlip::NoteEvents(double t_s) {
@@ -166,6 +329,12 @@ void StickSlip::NoteEvents(double t_s) {
   for (size_t k = 0; k < corners_.size(); ++k) {
     const ForceElement& element = elements[corners_[k]];
     log_.Note(element, t_s, HappeningOn(element, pieces_[k]), pieces_[k]);
+  }
+  for (const auto& [e, side] : ends_) {
+    log_.Note(elements[e], t_s,
+              touch_[e] == 0  ? Happening::kFree
+              : touch_[e] > 0 ? Happening::kUpperEnd
+                              : Happening::kLowerEnd);
   }
   std::vector<MotionEvent>& events = s_.run->trace.events;
   events.insert(events.end(), log_.events().begin() + static_cast<long>(events.size()),
@@ -183,14 +352,7 @@ std::vector<int> StickSlip::Pieces() const {
 
 // The first time found beyond which some law is on another piece, where one is at the end.
 double StickSlip::CornerTime(const Integrator::Node& node, double from_s, double h) {
-  double before = 0.0, beyond = h;
-  for (int i = 0; i < kHalvings; ++i) {
-    const double t = 0.5 * (before + beyond);
-    integrator_.Restore(node);
-    if (RunSummary summary = Go(from_s, t, false); !summary.ok()) trouble_ = summary;
-    (Pieces() == pieces_ ? before : beyond) = t;
-  }
-  return beyond;
+  return TimeOf(node, from_s, h, [this] { return Pieces() != pieces_; });
 }
 
 // The acceleration that counts as one.
@@ -215,9 +377,12 @@ int StickSlip::Started(size_t element) const {
 }
 
 bool StickSlip::Ended() const {
-  return Pieces() != pieces_ || std::ranges::any_of(friction_elements_, [this](size_t e) {
-           return Stopped(e) || Started(e) != 0;
-         });
+  const auto ends_here = [this](const auto& end) {
+    return IsBeyond(end.first, end.second) || Pulls(end.first);
+  };
+  return Pieces() != pieces_ || std::ranges::any_of(ends_, ends_here) ||
+         std::ranges::any_of(friction_elements_,
+                             [this](size_t e) { return Stopped(e) || Started(e) != 0; });
 }
 
 RunSummary StickSlip::Go(double from_s, double h, bool multistep) {
@@ -249,6 +414,7 @@ RunSummary StickSlip::AfterJump(const Step& next) {
   }
   if (RunSummary summary = Jump(next.from_s); !summary.ok()) return summary;
   if (RunSummary summary = LetGo(next.from_s); !summary.ok()) return summary;
+  if (RunSummary summary = LeaveStops(next.from_s); !summary.ok()) return summary;
   NoteEvents(next.from_s);
   s_.work.Jump(s_.WorkRates());
   uniform_ = 0;
@@ -392,19 +558,34 @@ RunSummary StickSlip::Find(const Integrator::Node& node, double from_s, double h
     if (Stopped(e)) stopped.push_back(e);
     if (Started(e) != 0) started.push_back(e);
   }
+  std::vector<std::pair<size_t, int>> hit, pulling;
+  for (const auto& [e, side] : ends_) {
+    if (IsBeyond(e, side)) hit.emplace_back(e, side);
+    if (touch_[e] == side && Pulls(e)) pulling.emplace_back(e, side);
+  }
   event->after_s = 2.0 * h;
   trouble_ = RunSummary::Done();
   if (Pieces() != pieces_) event->after_s = CornerTime(node, from_s, h);
   for (const size_t e : stopped) {
     const double at = StopTime(node, e, from_s, h);
-    if (at < event->after_s) *event = {.after_s = at, .stops = {e}, .starts = {}};
+    if (at < event->after_s) *event = {.after_s = at, .stops = {e}};
   }
   for (const size_t e : started) {
     int sign = 0;
     const double at = StartTime(node, e, from_s, h, &sign);
     if (at > event->after_s) continue;
-    if (at < event->after_s) *event = {.after_s = at, .stops = {}, .starts = {}};
+    if (at < event->after_s) *event = {.after_s = at};
     if (sign != 0) event->starts.emplace_back(e, sign);
+  }
+  for (const auto& [e, side] : hit) {
+    const double at = TimeOf(node, from_s, h, [&] { return GapTo(e, side) < 0.0; });
+    if (at > event->after_s) continue;
+    if (at < event->after_s) *event = {.after_s = at};
+    event->hits.emplace_back(e, side);
+  }
+  for (const auto& [e, side] : pulling) {
+    const double at = TimeOf(node, from_s, h, [&, of = e] { return Pulls(of); });
+    if (at < event->after_s) *event = {.after_s = at, .leaves = {e}};
   }
   return trouble_;
 }
@@ -436,6 +617,16 @@ RunSummary StickSlip::Advance(const Step& step) {
       return summary;
     }
     pieces_ = Pieces();
+    if (event.of_stops()) {
+      for (const size_t e : event.leaves) touch_[e] = 0, sliding_[e] = 1;
+      RunSummary summary = event.hits.empty() ? Jump(from) : Strike(event.hits, from);
+      if (summary.ok()) summary = LeaveStops(from);
+      if (!summary.ok()) return summary;
+      NoteEvents(from);
+      s_.work.Jump(s_.WorkRates());
+      uniform_ = 0;
+      continue;
+    }
     if (event.stops.empty() && event.starts.empty()) {  // forces go on at a corner
       NoteEvents(from);
       uniform_ = 0;
@@ -449,7 +640,9 @@ RunSummary StickSlip::Advance(const Step& step) {
     uniform_ = 0;
   }
   return {.stop = Stop::kNoConvergence,
-          .message = fmt::format("friction starts and stops again and again at t = {:.6g} s", from),
+          .message = fmt::format(
+              "{} again and again at t = {:.6g} s",
+              ends_.empty() ? "friction starts and stops" : "rigid stops are hit", from),
           .time_s = from,
           .states_time = true};
 }

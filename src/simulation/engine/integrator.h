@@ -60,6 +60,8 @@ class Integrator {
   };
   [[nodiscard]] Node Save() const { return {q_, v_, guidance_, a_, f_, nodes_}; }
   void Restore(const Node& node);
+  /// Changes the velocity of the present node, before EvaluateAgain().
+  void Strike(const VecX& change) { v_ += change; }
   /// The present node once more, where forces have jumped.
   void EvaluateAgain(const Commanded& at, double t_s);
 

@@ -77,30 +77,38 @@ bool IsKnown(const EngineModel& engine, const Coordinate& coordinate) {
 
 }  // namespace
 
-RunSummary CheckLoadInputs(const EngineModel& engine, const Load& load) {
-  for (const Load::Following& part : load.following) {
-    for (const StateFunction::Input& input : part.function.inputs) {
-      if (IsKnown(engine, input.coordinate)) continue;
-      return {.stop = Stop::kUnsupported,
-              .message = "load '" + load.name +
-                         "' follows a coordinate that MuJoCo does not have; the other witnesses "
-                         "take it as it is",
-              .where = load.name,
-              .names_where = true};
-    }
+namespace {
+
+RunSummary CheckInputs(const EngineModel& engine, const StateFunction& function,
+                       const std::string& path) {
+  for (const StateFunction::Input& input : function.inputs) {
+    if (IsKnown(engine, input.coordinate)) continue;
+    return {.stop = Stop::kUnsupported,
+            .message = "the expression of " + path +
+                       " follows a coordinate that MuJoCo does not have; the other witnesses take "
+                       "it as it is",
+            .where = path,
+            .names_where = true};
   }
   return RunSummary::Done();
 }
 
+}  // namespace
+
 FollowingLoads::FollowingLoads(const EngineModel& engine, const Motion& motion)
     : engine_(engine), motion_(motion) {
+  const auto add = [&](const StateFunction& function, std::vector<Angle>* angles) {
+    for (const StateFunction::Input& input : function.inputs) {
+      angles->push_back({.value = StartAngle(*engine.mechanism, motion, input.coordinate)});
+    }
+  };
   for (const Load& load : motion.loads) {
     std::vector<Angle>& angles = angles_.emplace_back();
-    for (const Load::Following& part : load.following) {
-      for (const StateFunction::Input& input : part.function.inputs) {
-        angles.push_back({.value = StartAngle(*engine.mechanism, motion, input.coordinate)});
-      }
-    }
+    for (const Load::Following& part : load.following) add(part.function, &angles);
+  }
+  for (const DriveForce& force : motion.forces) {
+    std::vector<Angle>& angles = angles_.emplace_back();
+    if (force.following) add(*force.following, &angles);
   }
 }
 
@@ -120,29 +128,49 @@ double FollowingLoads::Read(const StateFunction::Input& input, const mjData& d, 
   return turned;
 }
 
+double FollowingLoads::FunctionAt(const StateFunction& function, const std::string& path,
+                                  const mjData& d, double t_s, Angle* angle) {
+  std::vector<double> inputs;
+  for (const StateFunction::Input& input : function.inputs) {
+    inputs.push_back(Read(input, d, t_s, angle++));
+  }
+  const double value = function.value(t_s, inputs);
+  if (std::isfinite(value)) return value;
+  // Left out: the run ends, and MuJoCo gets numbers until then.
+  if (trouble_.ok()) trouble_ = HasNoValue(*engine_.mechanism, path, function, t_s, inputs, value);
+  return 0.0;
+}
+
 Vec6 FollowingLoads::PartOf(size_t l, const mjData& d, double t_s) {
   Vec6 sum = Vec6::Zero();
-  std::vector<double> inputs;
   Angle* angle = angles_[l].data();
-  for (const Load::Following& part : motion_.loads[l].following) {
-    inputs.clear();
-    for (const StateFunction::Input& input : part.function.inputs) {
-      inputs.push_back(Read(input, d, t_s, angle++));
-    }
-    const double value = part.function.value(t_s, inputs);
-    if (std::isfinite(value)) {
-      sum[part.component] += value;
-    } else if (trouble_.ok()) {  // left out: the run ends, and MuJoCo gets numbers until then
-      trouble_ = LoadHasNoValue(*engine_.mechanism, motion_.loads[l], part, t_s, inputs, value);
-    }
+  const Load& load = motion_.loads[l];
+  for (const Load::Following& part : load.following) {
+    sum[part.component] += FunctionAt(part.function, PathOf(load, part), d, t_s, angle);
+    angle += part.function.inputs.size();
   }
   return sum;
 }
 
+double FollowingLoads::ForceOf(size_t k, const mjData& d, double t_s) {
+  const DriveForce& force = motion_.forces[k];
+  if (!force.following) return 0.0;
+  return FunctionAt(*force.following, PathOf(*engine_.mechanism, force), d, t_s,
+                    angles_[motion_.loads.size() + k].data());
+}
+
 RunSummary CheckLoads(const EngineModel& engine, const Motion& motion) {
+  for (const DriveForce& force : motion.forces) {
+    if (!force.following) continue;
+    RunSummary summary = CheckInputs(engine, *force.following, PathOf(*engine.mechanism, force));
+    if (!summary.ok()) return summary;
+  }
   for (const Load& load : motion.loads) {
     if (engine.PlannedOf(load.body) >= 0) {
-      if (RunSummary summary = CheckLoadInputs(engine, load); !summary.ok()) return summary;
+      for (const Load::Following& part : load.following) {
+        RunSummary summary = CheckInputs(engine, part.function, PathOf(load, part));
+        if (!summary.ok()) return summary;
+      }
       continue;
     }
     return {.stop = Stop::kUnsupported,
@@ -174,6 +202,10 @@ void Loads::Evaluate(double t_s, const mjData& d) {
     if (!load.in_body_axes) continue;
     out.force = X_WB.linear() * out.force;
     out.moment = X_WB.linear() * out.moment;
+  }
+  given_.resize(motion_.forces.size());
+  for (size_t k = 0; k < given_.size(); ++k) {
+    given_[k] = mbv::Evaluate(motion_.forces[k].force, t_s).value + following_.ForceOf(k, d, t_s);
   }
   if (compensates_) AddCompensation(d);
 }
@@ -227,9 +259,10 @@ void Loads::AddCompensation(const mjData& d) {
 }
 
 bool Loads::follow() const {
-  return compensates_ || std::ranges::any_of(motion_.loads, [](const Load& load) {
-           return !load.following.empty();
-         });
+  const auto is_following = [](const DriveForce& force) { return force.following.has_value(); };
+  const auto has_following = [](const Load& load) { return !load.following.empty(); };
+  return compensates_ || std::ranges::any_of(motion_.loads, has_following) ||
+         std::ranges::any_of(motion_.forces, is_following);
 }
 
 void Loads::AddGeneralized(mjData* d, double* qfrc) const {

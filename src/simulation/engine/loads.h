@@ -10,11 +10,8 @@
 
 namespace mbv::simulation {
 
-/// kUnsupported where a load follows a coordinate that MuJoCo does not have.
-[[nodiscard]] RunSummary CheckLoadInputs(const EngineModel& engine, const Load& load);
-
-/// What loads are in addition to their profiles. MuJoCo's joints count rotations; the angles of
-/// outputs are counted here, from what was evaluated last.
+/// What loads and given drive forces are in addition to their profiles. MuJoCo's joints count
+/// rotations; the angles of outputs are counted here, from what was evaluated last.
 class FollowingLoads {
  public:
   /// Both outlive the object.
@@ -23,6 +20,8 @@ class FollowingLoads {
   /// [force; moment] of load `l`, in its axes, at the data's position (tendons) and velocity
   /// (mj_comVel).
   [[nodiscard]] Vec6 PartOf(size_t l, const mjData& d, double t_s);
+  /// The same of drive force `k` [N or N m].
+  [[nodiscard]] double ForceOf(size_t k, const mjData& d, double t_s);
   /// The first part that was not finite.
   [[nodiscard]] const RunSummary& trouble() const { return trouble_; }
 
@@ -33,10 +32,12 @@ class FollowingLoads {
   };
   [[nodiscard]] double Read(const StateFunction::Input& input, const mjData& d, double t_s,
                             Angle* angle) const;
+  [[nodiscard]] double FunctionAt(const StateFunction& function, const std::string& path,
+                                  const mjData& d, double t_s, Angle* angle);
 
   const EngineModel& engine_;
   const Motion& motion_;
-  std::vector<std::vector<Angle>> angles_;  ///< per load: of all inputs of its parts
+  std::vector<std::vector<Angle>> angles_;  ///< per load and drive force: of all inputs
   RunSummary trouble_ = RunSummary::Done();
 };
 
@@ -55,7 +56,8 @@ struct JointForce {
   double force = 0.0;  ///< [N or N m]
 };
 
-/// A load on a body that MuJoCo does not have (merged) is not supported.
+/// A load on a body that MuJoCo does not have (merged) is not supported, nor is an expression of a
+/// coordinate that it does not have.
 [[nodiscard]] RunSummary CheckLoads(const EngineModel& engine, const Motion& motion);
 
 /// Evaluates the motion's loads, and gravity compensation as further ones, at t for the data's
@@ -65,8 +67,10 @@ class Loads {
   Loads(const EngineModel& engine, const Motion& motion);
 
   void Evaluate(double t_s, const mjData& d);
-  /// True if some load follows the state: then Evaluate() needs the data's position, tendons and
-  /// mj_comVel.
+  /// Per given drive force at what was evaluated last [N or N m].
+  [[nodiscard]] const std::vector<double>& given() const { return given_; }
+  /// True if some load or drive force follows the state: then Evaluate() needs the data's position,
+  /// tendons and mj_comVel.
   [[nodiscard]] bool follow() const;
   /// The first load that was not finite; then nothing evaluated since is.
   [[nodiscard]] const RunSummary& trouble() const { return following_.trouble(); }
@@ -89,6 +93,7 @@ class Loads {
   const bool compensates_;
   std::vector<ExertedByDrive> exerted_by_drives_;
   std::vector<WorldLoad> world_;
+  std::vector<double> given_;
   std::vector<JointForce> joint_forces_;  ///< per exerted_by_drives_
 };
 

@@ -46,6 +46,8 @@ class WorkMeter {
   /// The same node with another power, after a jump of the forces.
   void Jump(const VecX& power) { power_[0] = power; }
   void Middle(const VecX& power) { middle_ = power; }
+  /// Adds what an impact does at this node to the work of the dampers, the last one [J].
+  void Add(double energy) { work_.tail<1>().array() += energy; }
   /// The step of length `h` to a node with this power.
   void Step(double h, bool multistep, const VecX& power);
   [[nodiscard]] const VecX& work() const { return work_; }

@@ -193,8 +193,8 @@ void Session::ApplyForces(double t_s, const Commanded& at) {
   if (lacking) AddLackingForces(system, at.motion.acceleration, data->qfrc_applied);
   if (!system.has_given_forces()) return;
   given.setZero(static_cast<Eigen::Index>(engine.driven.size()));
-  for (const DriveForce& force : motion.forces) {
-    given[force.drive] = Evaluate(force.force, t_s).value;
+  for (size_t k = 0; k < motion.forces.size(); ++k) {
+    given[motion.forces[k].drive] = loads.given()[k];
   }
   if (options.mode == DriveMode::kForceDriven) given.head(at.force.size()) = at.force;
   if (options.mode == DriveMode::kServo) RunServos(engine, at, data.get(), &given);

@@ -148,6 +148,17 @@ TEST_F(BenchmarkTest, AnErrorOfTwoPercentIsContradicted) {
   EXPECT_EQ(elsewhere, std::size(kPerturbed));
 }
 
+TEST_F(BenchmarkTest, ImpactsAndShocksAreThePublishedOnes) {
+  Copy("siconos_two_contacts");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kConfirmed);
+  Replace("model.yaml", "restitution: 0.8", "restitution: 0.8000008");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kContradicted);
+  Copy("sdnd101");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kConfirmed);
+  Replace("model.yaml", "stiffness: 1e6", "stiffness: 1.02e6");
+  EXPECT_EQ(Run().verdict, CaseVerdict::kContradicted);
+}
+
 // ω of a body that tumbles, in its own axes; about another axis, and of an output that is not
 // there.
 TEST_F(BenchmarkTest, AngularVelocitiesAreInTheOutputsAxes) {
