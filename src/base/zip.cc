@@ -81,7 +81,7 @@ std::optional<std::string> BytesOf(zip_source_t* source) {
 constexpr const char* kNotOurs = "mbverify package writes no such archive";
 
 // Plain files and folders, not encrypted; else what is wrong. `executable` if it is.
-std::string WhyNotPlain(zip_t* archive, const zip_stat_t& stat, bool* executable) {
+std::string NotPlainReason(zip_t* archive, const zip_stat_t& stat, bool* executable) {
   if ((stat.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && stat.encryption_method != ZIP_EM_NONE) {
     return "is encrypted";
   }
@@ -208,7 +208,7 @@ void ZipFile::ListEntry(std::uint64_t index) {
     return Refuse(fmt::format("'{}' leads outside of the archive, or is not a plain path", shown),
                   kNotOurs);
   }
-  if (const std::string why = WhyNotPlain(archive_, stat, &entry.executable); !why.empty()) {
+  if (const std::string why = NotPlainReason(archive_, stat, &entry.executable); !why.empty()) {
     return Refuse(fmt::format("'{}' {}", shown, why), kNotOurs);
   }
   if (!folder) entries_.push_back(std::move(entry));

@@ -43,14 +43,14 @@ int SayInternalError(const std::exception& error) {
 }
 
 // NaN passes every range, and infinity most.
-std::string WhyNotFinite(const std::string& text) {
+std::string NotFiniteReason(const std::string& text) {
   // What is not a number at all has its own message.
   return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
 }
 
 void RequireFiniteNumbers(CLI::App* app) {
   for (CLI::Option* option : app->get_options()) {
-    if (option->get_type_name().starts_with("FLOAT")) option->check(WhyNotFinite, "");
+    if (option->get_type_name().starts_with("FLOAT")) option->check(NotFiniteReason, "");
   }
   for (CLI::App* command : app->get_subcommands([](CLI::App*) { return true; })) {
     RequireFiniteNumbers(command);

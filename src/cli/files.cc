@@ -28,7 +28,7 @@ bool InMustFail(const fs::path& file, const fs::path& below) {
   return false;
 }
 
-std::string WhyRefused(const std::string& path, const std::vector<InputFile>& inputs) {
+std::string RefusedReason(const std::string& path, const std::vector<InputFile>& inputs) {
   const std::string input = SameFile(path, inputs);
   if (input.empty()) return "";
   return fmt::format("{} is {}, which was read for it: choose another file", path,
@@ -60,7 +60,7 @@ std::string BeginningOf(std::string_view content) {
 
 }  // namespace
 
-std::string WhyForeign(const std::string& path, const std::string& content) {
+std::string ForeignFileReason(const std::string& path, const std::string& content) {
   const auto old = ReadWholeFile(path);  // of a regular file
   if (!old || old->empty()) return "";
   const std::string there = BeginningOf(*old), here = BeginningOf(content);
@@ -142,7 +142,7 @@ std::vector<InputFile> InputsOf(const std::string& scenario) {
 int RefuseInput(const std::string& path, const std::string& scenario) {
   std::error_code error;
   if (path.empty() || !fs::exists(path, error)) return 0;  // nothing that could be lost
-  const std::string trouble = WhyRefused(path, InputsOf(scenario));
+  const std::string trouble = RefusedReason(path, InputsOf(scenario));
   if (trouble.empty()) return 0;
   Say(stderr, "error: {}\n", trouble);
   return 2;
@@ -150,8 +150,8 @@ int RefuseInput(const std::string& path, const std::string& scenario) {
 
 int WriteWholeFile(const std::string& path, const std::string& content,
                    const std::vector<InputFile>& inputs) {
-  std::string why = WhyRefused(path, inputs);
-  if (why.empty()) why = WhyForeign(path, content);
+  std::string why = RefusedReason(path, inputs);
+  if (why.empty()) why = ForeignFileReason(path, content);
   if (!why.empty()) return Refuse(why, "");
   const std::string trouble = WriteFile(path, content);
   return trouble.empty() ? 0 : NotWritten(trouble, "");

@@ -52,7 +52,7 @@ struct LoadOptions;
 
 /// Why `content` may not replace the regular file `path`: what is there is of another format, or a
 /// text that begins otherwise, so that mbverify did not write it. "" if it may.
-[[nodiscard]] std::string WhyForeign(const std::string& path, const std::string& content);
+[[nodiscard]] std::string ForeignFileReason(const std::string& path, const std::string& content);
 
 /// The file of a model's name; empty after the message that there is none.
 [[nodiscard]] std::optional<std::string> FindModelOrRefuse(const std::string& model);

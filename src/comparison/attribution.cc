@@ -149,8 +149,8 @@ Yardstick YardstickOf(const ComparisonInput& input, const CheckResult& check) {
 }
 
 // Why two computations that differ leave open which of them is wrong, or which one it is.
-Attribution WhyUndecided(const ComparisonInput& input, const Comparison& comparison,
-                         const CheckResult& check, bool third) {
+Attribution UndecidedAttribution(const ComparisonInput& input, const Comparison& comparison,
+                                 const CheckResult& check, bool third) {
   const PairComparison& pair = *comparison.FindPair(check.subject);
   if (check.follows && IsEngine(pair.measured) && pair.truth == input.driven_by) {
     if (third) return {pair.measured, "the simulation does not follow the motion that it is given"};
@@ -173,7 +173,7 @@ Attribution TwoDiffer(const ComparisonInput& input, const Comparison& comparison
                       const CheckResult& check, bool third) {
   const PairComparison& pair = *comparison.FindPair(check.subject);
   const Measured worst{.value = check.value, .time_s = check.time_s, .channel = check.channel};
-  Attribution attribution = WhyUndecided(input, comparison, check, third);
+  Attribution attribution = UndecidedAttribution(input, comparison, check, third);
   attribution.text = fmt::format(
       "{} and {} differ by {} in {}: worst at {}{}; {}", NameOf(comparison, pair.measured),
       NameOf(comparison, pair.truth), AmountOf(check), RowOf(check.metric).title,

@@ -152,8 +152,8 @@ void ReserveTable(const ComparisonInput& input, const Comparison& comparison,
 }
 
 // Of a witness that ran and that nothing was compared with.
-std::string WhyNothingInCommon(const ComparisonInput& input, const Comparison& comparison,
-                               const Witness& witness) {
+std::string NothingInCommonReason(const ComparisonInput& input, const Comparison& comparison,
+                                  const Witness& witness) {
   for (const PairComparison& pair : comparison.pairs) {
     const bool first = pair.measured == witness.name;
     if (!first && pair.truth != witness.name) continue;
@@ -202,7 +202,7 @@ void MarkInsensitive(const ComparisonInput& input, Comparison* comparison) {
   }
 }
 
-std::string WhyMarginUnknown(const Comparison& comparison) {
+std::string MarginUnknownReason(const Comparison& comparison) {
   for (const CheckResult& check : comparison.checks) {
     if (check.metric != Metric::kMotorUse || check.insensitive.empty() || IsWide(check)) continue;
     return fmt::format("{}: {}; what motors need between the samples is not known", check.name,
@@ -211,7 +211,7 @@ std::string WhyMarginUnknown(const Comparison& comparison) {
   return "";
 }
 
-std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& comparison) {
+std::string NothingVerifiedReason(const ComparisonInput& input, const Comparison& comparison) {
   bool any = false, coarse = true;
   for (const CheckResult& check : comparison.checks) {
     if (!Judges(input, check)) continue;
@@ -273,7 +273,7 @@ std::vector<Caveat> MissingWitnesses(const ComparisonInput& input, const Compari
     if (!asked || compared) continue;
     missing.push_back(
         witness.ran() ? MissingWitnessCaveat(witness.name, WitnessGap::kNoForces,
-                                             WhyNothingInCommon(input, comparison, witness))
+                                             NothingInCommonReason(input, comparison, witness))
                       : MissingWitnessCaveat(witness.name, witness.gap, witness.summary.message));
   }
   return missing;

@@ -15,12 +15,12 @@ void MarkInsensitive(const ComparisonInput& input, Comparison* comparison);
 
 /// Why no check of drive forces (of a free motion: of where it goes) verified anything; "" if one
 /// did.
-[[nodiscard]] std::string WhyNothingVerified(const ComparisonInput& input,
-                                             const Comparison& comparison);
+[[nodiscard]] std::string NothingVerifiedReason(const ComparisonInput& input,
+                                                const Comparison& comparison);
 
 /// Why a margin of motors is not known although its check passed: samples that do not resolve the
 /// motion; "" if there is none.
-[[nodiscard]] std::string WhyMarginUnknown(const Comparison& comparison);
+[[nodiscard]] std::string MarginUnknownReason(const Comparison& comparison);
 
 /// Loud in every report: limits that verify nothing, forces that only cancel out, few samples, a
 /// part of the motion that was not judged, a table without forces, rates that could not be checked

@@ -124,8 +124,8 @@ size_t CountAtRest(const ComparisonInput& input, const PairReader& reader) {
 }
 
 // Says why the pair's forces were not compared; "" if they were. A table need not hold every drive.
-std::string WhyNot(const ComparisonInput& input, const PairReader& reader, size_t wanted,
-                   const PairComparison& pair) {
+std::string NotComparableReason(const ComparisonInput& input, const PairReader& reader,
+                                size_t wanted, const PairComparison& pair) {
   const bool table = input.table != nullptr && pair.Involves(role::kReference);
   if (reader.samples.empty()) return "the two have no sample time in common";
   const bool motion_only =
@@ -170,7 +170,7 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
   FindSpan(input, reader, pair);
   pair->samples_at_rest = CountAtRest(input, reader);
   pair->forces_act = scale.acts;
-  pair->reason = WhyNot(input, reader, wanted, *pair);
+  pair->reason = NotComparableReason(input, reader, wanted, *pair);
   pair->compared = pair->reason.empty();
   if (pair->compared && !pair->drives.empty()) {
     pair->digits = MatchingDigits(pair->metrics[Metric::kForceNrmse].value);

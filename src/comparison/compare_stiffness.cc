@@ -118,7 +118,7 @@ PairComparison CompareStiffnesses(const Witness& measured, const Witness& truth)
   PairComparison pair;
   pair.measured = measured.name;
   pair.truth = truth.name;
-  pair.reason = internal::WhyNotCompared(measured, truth);
+  pair.reason = internal::NotComparedReason(measured, truth);
   if (!pair.reason.empty()) return pair;
   pair.compared = true;
   const StiffnessWitness &a = *measured.stiffness, &b = *truth.stiffness;

@@ -245,7 +245,7 @@ void AddPair(const ComparisonInput& input, const std::string& measured, const st
   } else {
     pair.measured = measured;
     pair.truth = truth;
-    pair.reason = internal::WhyNotCompared(*a, *b);
+    pair.reason = internal::NotComparedReason(*a, *b);
     if (pair.reason.empty()) pair = ComparePair(input, *a->trace, *b->trace);
     LeaveOutReachedMotion(&pair);
   }
@@ -294,7 +294,7 @@ const Witness* FindBroken(const ComparisonInput& input) {
 }
 
 // A table that was given must have been judged, and must be able to show errors.
-std::string WhyTableVerifiesNothing(const Comparison& comparison) {
+std::string TableVerifiesNothingReason(const Comparison& comparison) {
   const TableVerdict& table = *comparison.table;
   if (!table.too_coarse.empty()) return table.too_coarse;
   const bool judged =
@@ -377,20 +377,20 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     }
     return;
   }
-  comparison->reason = WhyHorizonTooLong(input, *comparison);
+  comparison->reason = HorizonTooLongReason(input, *comparison);
   if (!comparison->reason.empty()) return;
-  const std::string nothing = WhyNothingVerified(input, *comparison);
+  const std::string nothing = NothingVerifiedReason(input, *comparison);
   const size_t failed = comparison->failed();
   if (failed == 0 && !nothing.empty()) {
     comparison->reason = nothing;
     return;
   }
   if (input.table != nullptr && failed == 0) {
-    comparison->reason = WhyTableVerifiesNothing(*comparison);
+    comparison->reason = TableVerifiesNothingReason(*comparison);
     if (!comparison->reason.empty()) return;
   }
   if (failed == 0) {
-    comparison->reason = WhyMarginUnknown(*comparison);
+    comparison->reason = MarginUnknownReason(*comparison);
     if (!comparison->reason.empty()) return;
   }
   comparison->verdict = failed == 0 ? Verdict::kAgree : Verdict::kDisagree;
@@ -403,7 +403,7 @@ bool Witness::ran() const {
   return stiffness != nullptr ? stiffness->ran() : trace != nullptr && summary.ok();
 }
 
-std::string internal::WhyNotCompared(const Witness& measured, const Witness& truth) {
+std::string internal::NotComparedReason(const Witness& measured, const Witness& truth) {
   std::string why;
   for (const Witness* witness : {&measured, &truth}) {
     if (witness->ran()) continue;

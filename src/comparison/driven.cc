@@ -377,7 +377,7 @@ bool IsEvidence(const ComparisonInput& input, const CheckResult& check) {
   return false;
 }
 
-std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& comparison) {
+std::string HorizonTooLongReason(const ComparisonInput& input, const Comparison& comparison) {
   constexpr double kMost = 1e-2;  // of a radian or of the characteristic length
   if (input.mode != DriveMode::kForceDriven) return "";
   if (input.perturbed == nullptr) {

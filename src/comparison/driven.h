@@ -53,8 +53,8 @@ void LeaveOutReachedMotion(PairComparison* pair);
 [[nodiscard]] bool IsEvidence(const ComparisonInput& input, const CheckResult& check);
 
 /// Why the horizon of a force-driven run is too long for a judgement; "" if it is not.
-[[nodiscard]] std::string WhyHorizonTooLong(const ComparisonInput& input,
-                                            const Comparison& comparison);
+[[nodiscard]] std::string HorizonTooLongReason(const ComparisonInput& input,
+                                               const Comparison& comparison);
 
 /// Who is wrong in a force-driven or servo run, or how well it agrees; an empty text where the
 /// simulation's motion and forces show nothing.

@@ -37,7 +37,7 @@ inline void KeepWorst(std::map<Metric, Measured>* metrics, Metric metric,
 /// Fills drives, force metrics, and whether and why not the pair is compared.
 void CompareForces(const ComparisonInput& input, const PairReader& reader, PairComparison* pair);
 /// Why two witnesses cannot be compared: what stopped them; "" if both ran.
-[[nodiscard]] std::string WhyNotCompared(const Witness& measured, const Witness& truth);
+[[nodiscard]] std::string NotComparedReason(const Witness& measured, const Witness& truth);
 /// What one would expect to be judged of stiffnesses and is not.
 void AddStiffnessNotes(const ComparisonInput& input, Comparison* comparison);
 /// Joint reactions that both give in the same frame and that statics determines, and the forces of

@@ -74,7 +74,7 @@ class SpinFinder {
     spin->p_BP = X_BW * p_WP_;
     spin->n_B = X_BW.linear() * n_W_;
     for (const int body : spin->bodies) {
-      if (spin->why_not.empty()) spin->why_not = WhyNotSymmetric(body);
+      if (spin->why_not.empty()) spin->why_not = NotSymmetricReason(body);
     }
     if (spin->why_not.empty()) spin->why_not = WhatHolds();
     if (spin->why_not.empty()) spin->why_not = WhatActsOn(balls);
@@ -122,7 +122,7 @@ class SpinFinder {
   }
 
   // (1)
-  [[nodiscard]] std::string WhyNotSymmetric(int index) const {
+  [[nodiscard]] std::string NotSymmetricReason(int index) const {
     const Body& body = m_.bodies[static_cast<size_t>(index)];
     const double beside = BesideLine(Home(index) * body.p_BoBcm_B);
     if (body.mass > 0.0 && beside > kBeside * distance_) {

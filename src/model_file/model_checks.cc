@@ -73,7 +73,7 @@ struct Reason {
 };
 
 // What no computation can take.
-Reason WhyUnusable(const Body& body) {
+Reason UnusableReason(const Body& body) {
   if (body.I_Bcm_B.isZero(0.0)) return {};
   if (body.mass == 0.0) {
     return {"an inertia without mass",
@@ -87,7 +87,7 @@ Reason WhyUnusable(const Body& body) {
   return {};
 }
 
-Reason WhyTooLarge(const Body& body) {
+Reason TooLargeReason(const Body& body) {
   if (body.mass > kLargestMass_kg) {
     return {fmt::format("mass = {} violates mass <= {:g} kg", body.mass, kLargestMass_kg), ""};
   }
@@ -150,8 +150,8 @@ void CheckMasses(const Mechanism& mechanism, Impossible impossible, ModelReport*
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
     if (!std::isfinite(body.mass)) continue;  // already reported
-    Reason reason = WhyTooLarge(body);
-    if (reason.text.empty()) reason = WhyUnusable(body);
+    Reason reason = TooLargeReason(body);
+    if (reason.text.empty()) reason = UnusableReason(body);
     if (!reason.text.empty()) {
       report->AtBody(mechanism, b, Severity::kError, reason.text, reason.hint);
       continue;

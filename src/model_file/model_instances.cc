@@ -101,7 +101,7 @@ void ParameterReader::Define(YamlReader* yaml, const Block& block, const YamlNod
   if (node == nullptr) return;
   for (const YamlEntry& entry : yaml->Entries(*node, path)) {
     const std::string where = JoinPath(path, entry.key);
-    if (const std::string why = WhyNoParameterName(entry.key); !why.empty()) {
+    if (const std::string why = InvalidNameReason(entry.key); !why.empty()) {
       yaml->Error(entry, fmt::format("{}: bad parameter name '{}'", path, entry.key), why);
       continue;
     }
@@ -193,7 +193,7 @@ Finding ParameterReader::PlaceOfOverride(const std::string& name) const {
 
 void ParameterReader::CheckOverrides() {
   for (const auto& [name, value] : options_.overrides) {
-    const std::string why = WhyNoNumber(value);
+    const std::string why = NotANumberReason(value);
     const bool used = used_overrides_.contains(name);
     if (used && why.empty()) continue;
     Finding finding = PlaceOfOverride(name);

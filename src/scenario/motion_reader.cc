@@ -397,7 +397,7 @@ StateFunctions::StateFunctions(ValueReader* values, const Mechanism& mechanism,
   YamlReader& yaml = values->yaml();
   for (const YamlEntry& entry : yaml.Entries(*variables, "variables")) {
     const std::string path = "variables." + entry.key;
-    std::string why_not = WhyNoParameterName(entry.key);
+    std::string why_not = InvalidNameReason(entry.key);
     if (entry.key == kTime) why_not = "t is the time here";
     if (values->HasParameter(entry.key)) why_not = "it is a parameter of " + mechanism.name;
     if (!why_not.empty()) {

@@ -39,7 +39,7 @@ class ForeignRunner {
 
   WitnessRecord Run(const DrivenMotion& driven) {
     std::optional<ProgramFailure> failure;
-    std::string trouble = WhyNotAsked();
+    std::string trouble = NotAskedReason();
     if (trouble.empty()) trouble = HandOver(driven);
     if (!trouble.empty()) failure = ProgramFailure{WitnessGap::kNotHandedOver, trouble};
     if (!failure) failure = call_.Run();
@@ -55,7 +55,7 @@ class ForeignRunner {
   }
 
  private:
-  [[nodiscard]] std::string WhyNotAsked() const {
+  [[nodiscard]] std::string NotAskedReason() const {
     if (!motion_.switches.empty() || !JumpTimes(motion_).empty()) {
       return "switched elements and forces that jump are not handed to foreign witnesses";
     }

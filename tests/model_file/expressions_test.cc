@@ -188,14 +188,14 @@ TEST(Expressions, AFailedOuterParameterIsSilentInside) {
 }
 
 TEST(Expressions, ParameterNamesAreWordsWithoutAMeaningOfTheirOwn) {
-  EXPECT_EQ(WhyNoParameterName("theta_1"), "");
+  EXPECT_EQ(InvalidNameReason("theta_1"), "");
   for (const char* name : {"", "1a", "a b", "a.b", "a-b", "ä"}) {
-    EXPECT_EQ(WhyNoParameterName(name), "a parameter's name is made of letters, digits and _");
+    EXPECT_EQ(InvalidNameReason(name), "a parameter's name is made of letters, digits and _");
   }
   for (const char* name : {"pi", "inf", "NaN"}) {
-    EXPECT_EQ(WhyNoParameterName(name), "this name has a fixed meaning") << name;
+    EXPECT_EQ(InvalidNameReason(name), "this name has a fixed meaning") << name;
   }
-  EXPECT_EQ(WhyNoParameterName("sin"), "this is the name of a function");
+  EXPECT_EQ(InvalidNameReason("sin"), "this is the name of a function");
 }
 
 }  // namespace

@@ -1249,7 +1249,7 @@ class Prover {
 };
 
 // Why a mechanism in motion is not served.
-std::string WhyNotServed(const Motion& motion) {
+std::string NotServedReason(const Motion& motion) {
   if (motion.free()) return "not provable: forces are given, and the motion is integrated";
   return "";
 }
@@ -1459,7 +1459,7 @@ std::string Certificate::Sentence() const {
 Certificate Certify(const Mechanism& mechanism, const Motion& motion,
                     const std::vector<CertifiedTrace>& traces, const CertifyOptions& options) {
   Certificate certificate;
-  certificate.why_not = WhyNotServed(motion);
+  certificate.why_not = NotServedReason(motion);
   if (!certificate.why_not.empty()) return certificate;
   const exact::NumberPool pool;
   const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);

@@ -336,7 +336,7 @@ std::string Explained(const std::string& kind, bool of_softness) {
   return of_softness ? "not explained: another softness" : "not explained: another velocity term";
 }
 
-std::string WhyOf(const RowChange& change, double scale) {
+std::string ReasonOf(const RowChange& change, double scale) {
   std::vector<std::string> reasons;
   const bool softness = std::max(std::abs(change.softness_least - 1.0),
                                  std::abs(change.softness_most - 1.0)) > kRoundOff;
@@ -385,7 +385,7 @@ std::vector<RowChange> CompareRows(const RowSurvey& survey, const RowAnswer& ans
                                    [&](const RowChange& change) { return change.kind == kind; });
     if (!known) changes.push_back(ChangeOf(kind, survey, answer));
   }
-  for (RowChange& change : changes) change.why = WhyOf(change, scale);
+  for (RowChange& change : changes) change.why = ReasonOf(change, scale);
   return changes;
 }
 

@@ -586,7 +586,8 @@ double ForceSensitivity(const MutationBench& bench, const Trace& perturbed) {
 }
 
 // Why two exchanged drives are not distinguished: how much they differ in the unperturbed run.
-std::string WhySwapUnseen(const MutationBench& bench, const std::string& a, const std::string& b) {
+std::string SwapUnseenReason(const MutationBench& bench, const std::string& a,
+                             const std::string& b) {
   const Trace& trace = bench.base().trace;
   double worst = 0.0;
   for (const Quantity quantity : {Quantity::kPosition, Quantity::kForce}) {
@@ -663,8 +664,8 @@ std::string DescribeChange(const Mechanism& base, const Mechanism& perturbed) {
 // drive force over the run relative to its RMS, and where the effect goes instead (base reactions,
 // joint reactions, inertia forces that the motion does not call for). `perturbation` is the subject
 // of that sentence: "10 % wrong".
-std::string WhyUnseen(const MutationBench& bench, const Mechanism& perturbed,
-                      const PerturbedRun& run, const std::string& perturbation) {
+std::string UnseenReason(const MutationBench& bench, const Mechanism& perturbed,
+                         const PerturbedRun& run, const std::string& perturbation) {
   const Mechanism& base = bench.mechanism();
   const std::string change = DescribeChange(base, perturbed);
   const double sensitivity = ForceSensitivity(bench, run.trace);
@@ -778,7 +779,7 @@ class Mutator {
     m->sensitivity = ForceSensitivity(exact_, way.run.trace);
     std::string why;
     const auto perturbed = exact_.Perturb(number.At(error), &why);
-    m->reason = perturbed ? WhyUnseen(exact_, *perturbed, way.run, number.Text(error)) : why;
+    m->reason = perturbed ? UnseenReason(exact_, *perturbed, way.run, number.Text(error)) : why;
   }
 
   FaultResult Put(const StructuralFault& fault) {
@@ -806,7 +807,7 @@ class Mutator {
       Count(fault.kind);
       result.own = See(own_, own_.Run(fault.wrong[exact->candidate]));
     }
-    if (!result.own.detected) result.own.reason = WhyFaultUnseen(fault, exact->run);
+    if (!result.own.detected) result.own.reason = FaultUnseenReason(fault, exact->run);
     return result;
   }
 
@@ -842,14 +843,14 @@ class Mutator {
     return seen;
   }
 
-  std::string WhyFaultUnseen(const StructuralFault& fault, const PerturbedRun& run) {
+  std::string FaultUnseenReason(const StructuralFault& fault, const PerturbedRun& run) {
     const double change = ForceSensitivity(exact_, run.trace);
     if (change > MutationBench::Visible(0.0)) {
       missed_ = true;
     } else if (!fault.first.empty()) {
-      return WhySwapUnseen(exact_, fault.first, fault.second);
+      return SwapUnseenReason(exact_, fault.first, fault.second);
     }
-    return WhyUnseen(exact_, fault.wrong.front(), run, "it");
+    return UnseenReason(exact_, fault.wrong.front(), run, "it");
   }
 
   const MutationOptions& options_;

@@ -30,7 +30,7 @@ bool CanBePerturbed(const Scenario& scenario, Diagnostics* diagnostics) {
 }
 
 // Why there is nothing to compare; "" if there is.
-std::string WhyNothing(const WitnessRuns& runs, bool ignore_ranges) {
+std::string NothingToCompareReason(const WitnessRuns& runs, bool ignore_ranges) {
   if (runs.bad_input.has_errors()) return runs.bad_input.findings().front().message;
   if (!ignore_ranges && !runs.violations.empty()) return runs.violations.front().Text();
   if (const RunSummary& summary = runs.Find(role::kSimulated)->summary; !summary.ok()) {
@@ -157,7 +157,7 @@ PerturbedRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario
 
 PerturbedRun MutationBench::Judge(WitnessRuns runs, const Scenario& scenario) const {
   PerturbedRun perturbed;
-  perturbed.failure = WhyNothing(runs, scenario.simulation.ignore_ranges);
+  perturbed.failure = NothingToCompareReason(runs, scenario.simulation.ignore_ranges);
   if (!perturbed.failure.empty()) return perturbed;
   ComparisonInput input = InputOf(prepared_);
   input.drive_facts = DriveFactsOf(prepared_);

@@ -338,9 +338,9 @@ RerunSignal MovedBy(const std::string& name, const CheckNumbers& packed,
 }
 
 // The first check that only one of the two has, else the one that has moved farthest.
-std::string WhyOutside(const std::map<std::string, CheckNumbers>& packed,
-                       const std::map<std::string, CheckNumbers>& rerun,
-                       const std::vector<RerunSignal>& signals) {
+std::string OutsideReason(const std::map<std::string, CheckNumbers>& packed,
+                          const std::map<std::string, CheckNumbers>& rerun,
+                          const std::vector<RerunSignal>& signals) {
   for (const auto& [name, numbers] : packed) {
     if (!rerun.contains(name)) return fmt::format("the check {} is not made any more", name);
   }
@@ -389,7 +389,7 @@ RerunFile CompareSummaries(const std::string& path, const std::string& packed,
     file.outcome = RerunOutcome::kWithin;
     return file;
   }
-  file.why = WhyOutside(packed_checks, checks, file.signals);
+  file.why = OutsideReason(packed_checks, checks, file.signals);
   return file;
 }
 

@@ -64,7 +64,7 @@ int WriteUrdfFiles(const std::string& path, const std::string& text, const LoadR
   const std::string companion = UrdfCompanionPath(path);
   const std::string completed =
       WriteUrdfCompanion(*loaded.mechanism, fs::path(path).filename(), loaded.caveats);
-  if (const std::string why = WhyForeign(path, text); !why.empty()) return Refuse(why, "");
+  if (const std::string why = ForeignFileReason(path, text); !why.empty()) return Refuse(why, "");
   if (const int refused = WriteWholeFile(companion, completed, inputs); refused != 0) {
     return refused;
   }

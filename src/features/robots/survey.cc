@@ -338,7 +338,7 @@ int WriteSurvey(const SurveyArguments& arguments, const std::vector<SurveyRow>& 
 }
 
 // Why a file that looks like a robot is passed over; "" of a robot.
-std::string WhySkipped(const std::string& file) {
+std::string SkippedReason(const std::string& file) {
   if (file.ends_with(".xacro")) return XacroHint(file);
   if (file.ends_with(".urdf")) return "";
   const auto text = ReadWholeFile(file);
@@ -362,7 +362,7 @@ int Survey(const SurveyArguments& arguments) {
   std::vector<std::string> files;
   for (const char* ending : {".urdf", ".xml", ".sdf", ".xacro"}) {
     for (const std::string& file : FilesBelow(arguments.folder, ending, &unread)) {
-      const std::string why = WhySkipped(file);
+      const std::string why = SkippedReason(file);
       if (why.empty()) {
         files.push_back(file);
       } else {

@@ -55,7 +55,7 @@ struct Present {
 constexpr const char* kOtherState = "made from another state of ";
 
 // Why what inputs.json belongs to says nothing about the files as they are; "" if it does.
-std::string WhyStale(const JsonValue& made, const Present& present) {
+std::string StaleReason(const JsonValue& made, const Present& present) {
   const std::string program = made.value("program", std::string());
   const std::string here = fmt::format("mbverify {}", kVersion);
   if (program != here) {
@@ -84,7 +84,8 @@ std::string WhyStale(const JsonValue& made, const Present& present) {
 
 using Fill = std::function<void(const JsonValue& document, SheetRow* row)>;
 
-// What a document says, if it is there and about the files as they are. `origin`: WhyStale() of it.
+// What a document says, if it is there and about the files as they are. `origin`: StaleReason() of
+// it.
 void ReadEvidence(const fs::path& document,
                   const std::function<std::string(const JsonValue& document)>& origin,
                   const Fill& fill, SheetRow* row) {
@@ -114,7 +115,7 @@ void ReadResult(const fs::path& document, const Present& present, const Fill& fi
         const std::optional<std::string> text = ReadWholeFile(file);
         if (!text) return "there is no " + file.string();
         const auto read =
-            ReadJson(*text, [&](const JsonValue& made) { return WhyStale(made, present); });
+            ReadJson(*text, [&](const JsonValue& made) { return StaleReason(made, present); });
         return read ? *read.value : file.string() + ": " + read.refusal.Text();
       },
       fill, row);

@@ -236,7 +236,7 @@ class QualityMapper {
     AddIndices();
   }
 
-  [[nodiscard]] std::string WhyNone() const {
+  [[nodiscard]] std::string NoneReason() const {
     if (dofs_ <= static_cast<Eigen::Index>(mechanism_.drives.size())) return "";
     return fmt::format("{} drives for {} degrees of freedom: they do not hold the mechanism",
                        mechanism_.drives.size(), dofs_);
@@ -733,7 +733,7 @@ QualityMap MapQuality(const SetQuestion& question, const ReachableSet& set,
     if (point.inside) some.push_back(placing.States(point.pose).X_WB);
   }
   const QualityMapper mapper(placing, output, some);
-  map.why_none = mapper.WhyNone();
+  map.why_none = mapper.NoneReason();
   if (!map.why_none.empty()) return map;
   map.indices = mapper.indices();
   map.no_limb = mapper.NoLimb();

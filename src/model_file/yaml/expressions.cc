@@ -104,7 +104,7 @@ ExpressionResult Parse(const std::string& text, const std::map<std::string, doub
               .error = fmt::format("gives {}, a finite number is needed", value),
               .hint = "look for a root of a negative number or a division by zero"};
     }
-    if (const std::string why = WhyNoNumber(value); !why.empty()) {
+    if (const std::string why = NotANumberReason(value); !why.empty()) {
       return {.value = {}, .error = fmt::format("gives {}, which {}", value, why), .hint = ""};
     }
     return {.value = value, .error = "", .hint = ""};
@@ -163,7 +163,7 @@ class Expression {
     try {
       int count = 0;
       const double* results = parser_->Eval(count);
-      if (count == 1 && WhyNoNumber(results[0]).empty()) return results[0];
+      if (count == 1 && NotANumberReason(results[0]).empty()) return results[0];
     } catch (const mu::ParserError&) {  // no std::exception
       refused_ = true;
     } catch (const std::exception&) {
@@ -224,7 +224,7 @@ bool IsWrittenOut(const std::string& expression) {
   return PlainNumber(expression) || ExpressionOf(expression)->written_out();
 }
 
-std::string WhyNoParameterName(const std::string& name) {
+std::string InvalidNameReason(const std::string& name) {
   const bool is_name = !name.empty() && IsNameStart(name.front()) &&
                        std::all_of(name.begin(), name.end(), IsNamePart);
   if (!is_name) return "a parameter's name is made of letters, digits and _";
@@ -295,7 +295,7 @@ ExpressionResult Scope::Use(const std::string& name) {
 
 ExpressionResult Scope::Evaluate(const std::string& expression) {
   if (const auto number = PlainNumber(expression)) {
-    const std::string why = WhyNoNumber(*number);
+    const std::string why = NotANumberReason(*number);
     if (why.empty()) return {.value = number, .error = "", .hint = ""};
     return {.value = {}, .error = why, .hint = ""};
   }
@@ -353,7 +353,7 @@ std::vector<std::string> Scope::Names() const {
   return names;
 }
 
-std::string WhyNoNumber(double value) {
+std::string NotANumberReason(double value) {
   if (!std::isfinite(value)) return "is not a finite number";
   if (std::abs(value) <= kLargestNumber) return "";
   return fmt::format("violates |number| <= {:g}", kLargestNumber);

@@ -89,9 +89,9 @@ class Scope {
 /// Products of a few larger numbers overflow.
 inline constexpr double kLargestNumber = 1e30;
 /// Empty if a model may contain this number, else why not ("is not a finite number").
-[[nodiscard]] std::string WhyNoNumber(double value);
+[[nodiscard]] std::string NotANumberReason(double value);
 
 /// Empty if `name` may name a parameter, else why not ("'2a' is not a name: …").
-[[nodiscard]] std::string WhyNoParameterName(const std::string& name);
+[[nodiscard]] std::string InvalidNameReason(const std::string& name);
 
 }  // namespace mbv

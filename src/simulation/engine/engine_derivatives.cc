@@ -16,7 +16,7 @@ using simulation::EngineModel;
 constexpr double kStep_s = 1e-4;
 constexpr double kDifference = 1e-6;  // mjd_transitionFD's usual one
 
-std::string WhyUnsupported(const Mechanism& mechanism) {
+std::string UnsupportedReason(const Mechanism& mechanism) {
   if (!mechanism.elements.empty()) return "its force elements are not all MuJoCo's own";
   if (HasGravityCompensation(mechanism)) return "gravity is compensated";
   if (!mechanism.prescribed.empty()) return "joints are prescribed";
@@ -74,7 +74,7 @@ EngineDerivatives DifferentiateEngine(const Mechanism& mechanism, const std::vec
                                       bool default_softness) {
   EngineDerivatives out;
   out.summary.stop = Stop::kUnsupported;
-  out.summary.message = WhyUnsupported(mechanism);
+  out.summary.message = UnsupportedReason(mechanism);
   if (!out.summary.message.empty()) return out;
   std::vector<std::string> warnings;
   const simulation::EngineSession session(&warnings);
