@@ -1,19 +1,45 @@
 // Cost per sample and per step of chains of N four-bars: how it grows with the number of loops.
 #include <benchmark/benchmark.h>
 
+#include <cmath>
+
 #include "reference/forward.h"
 #include "reference/reference.h"
 #include "simulation/engine/engine_model.h"
 #include "simulation/engine/simulation.h"
 #include "simulation/mjcf/mjcf.h"
 #include "tests/mechanisms/four_bar_chain.h"
+#include "tests/mechanisms/loop_shapes.h"
 
 namespace mbv {
 namespace {
 
-void Reference(benchmark::State& state) {
-  const Mechanism mechanism = FourBarChain(static_cast<int>(state.range(0)));
-  const Motion motion = FourBarChainMotion(mechanism);
+// A mechanism by its number of loops, and how it moves.
+struct Shape {
+  Mechanism (*make)(int loops);
+  Motion (*move)(const Mechanism& mechanism);
+};
+Motion Swing(const Mechanism& mechanism) { return SwingAllDrives(mechanism, 0.1); }
+// In proportion to what the angles of a polygon are.
+Motion SwingLoop(const Mechanism& mechanism) {
+  return SwingAllDrives(mechanism, 0.2 / static_cast<double>(mechanism.bodies.size()));
+}
+Motion SwingLegs(const Mechanism& mechanism) { return SwingAllDrives(mechanism, 0.01); }
+constexpr Shape kChain{FourBarChain, FourBarChainMotion};
+constexpr Shape kScissors{[](int n) { return MechanismOf(ScissorLiftText(n)); }, Swing};
+constexpr Shape kStoreys{[](int n) { return MechanismOf(StoreysText(n)); }, Swing};
+constexpr Shape kPlacedScissors{[](int n) { return MechanismOf(ScissorLiftText(n, true)); }, Swing};
+constexpr Shape kPlacedStoreys{[](int n) { return MechanismOf(StoreysText(n, true)); }, Swing};
+constexpr Shape kPlacedLoop{[](int n) { return MechanismOf(LongLoopText(n, true)); }, SwingLoop};
+constexpr Shape kNet{
+    [](int n) { return MechanismOf(NetOfPlatesText(static_cast<int>(std::lround(std::sqrt(n))))); },
+    Swing};
+constexpr Shape kHexapods{[](int n) { return MechanismOf(HexapodsText(n / 5)); }, SwingLegs};
+constexpr Shape kLoop{[](int n) { return MechanismOf(LongLoopText(n)); }, SwingLoop};
+
+void Reference(benchmark::State& state, const Shape& shape) {
+  const Mechanism mechanism = shape.make(static_cast<int>(state.range(0)));
+  const Motion motion = shape.move(mechanism);
   ReferenceSolver solver(mechanism, motion);
   CommandSample command;
   ReferenceSample sample;
@@ -29,9 +55,10 @@ void Reference(benchmark::State& state) {
 }
 
 // The loop alone, per sample or step.
-void Simulation(benchmark::State& state, const SimulationOptions& options) {
-  const Mechanism mechanism = FourBarChain(static_cast<int>(state.range(0)));
-  const Motion motion = FourBarChainMotion(mechanism);
+void Simulation(benchmark::State& state, const Shape& shape, DriveMode mode) {
+  const Mechanism mechanism = shape.make(static_cast<int>(state.range(0)));
+  const Motion motion = shape.move(mechanism);
+  const SimulationOptions options{.mode = mode};
   CommandSample command;
   const auto driven = [&](double t, DrivenSample* at) {
     EvaluateMotion(motion, t, &command);
@@ -80,8 +107,8 @@ void FreeSimulation(benchmark::State& state) {
   state.SetComplexityN(state.range(0));
 }
 
-void BareMjStep(benchmark::State& state) {
-  const Mechanism mechanism = FourBarChain(static_cast<int>(state.range(0)));
+void BareMjStep(benchmark::State& state, const Shape& shape) {
+  const Mechanism mechanism = shape.make(static_cast<int>(state.range(0)));
   std::vector<std::string> warnings;
   simulation::EngineSession session(&warnings);
   simulation::EngineModel engine;
@@ -98,15 +125,40 @@ void Loops(benchmark::internal::Benchmark* benchmark) {
   for (const int loops : {10, 20, 50, 100, 200, 500}) benchmark->Arg(loops);
   benchmark->Unit(benchmark::kMicrosecond)->Complexity();
 }
-BENCHMARK(Reference)->Apply(Loops);
-BENCHMARK_CAPTURE(Simulation, inverse, {.mode = DriveMode::kInverse})
-    ->Apply(Loops)
-    ->UseManualTime()
-    ->Iterations(1);
-BENCHMARK_CAPTURE(Simulation, forward, {})->Apply(Loops)->UseManualTime()->Iterations(1);
+
+// From some 20 to some 200 loops; of nets, of which a square number is.
+void FewLoops(benchmark::internal::Benchmark* benchmark) {
+  for (const int loops : {20, 60, 200}) benchmark->Arg(loops);
+  benchmark->Unit(benchmark::kMicrosecond);
+}
+void Squares(benchmark::internal::Benchmark* benchmark) {
+  for (const int loops : {25, 64, 121}) benchmark->Arg(loops);
+  benchmark->Unit(benchmark::kMicrosecond);
+}
+
+#define MBV_SHAPE(name, shape, sizes)                                            \
+  BENCHMARK_CAPTURE(Reference, name, shape)->Apply(sizes);                       \
+  BENCHMARK_CAPTURE(Simulation, name##_inverse, shape, DriveMode::kInverse)      \
+      ->Apply(sizes)                                                             \
+      ->UseManualTime()                                                          \
+      ->Iterations(1);                                                           \
+  BENCHMARK_CAPTURE(Simulation, name##_forward, shape, SimulationOptions{}.mode) \
+      ->Apply(sizes)                                                             \
+      ->UseManualTime()                                                          \
+      ->Iterations(1);                                                           \
+  BENCHMARK_CAPTURE(BareMjStep, name, shape)->Apply(sizes)
+
+MBV_SHAPE(chain, kChain, Loops);
+MBV_SHAPE(scissors, kScissors, FewLoops);
+MBV_SHAPE(storeys, kStoreys, FewLoops);
+MBV_SHAPE(net, kNet, Squares);
+MBV_SHAPE(hexapods, kHexapods, FewLoops);
+MBV_SHAPE(loop, kLoop, FewLoops);
+MBV_SHAPE(placed_scissors, kPlacedScissors, FewLoops);
+MBV_SHAPE(placed_storeys, kPlacedStoreys, FewLoops);
+MBV_SHAPE(placed_loop, kPlacedLoop, FewLoops);
 BENCHMARK(FreeReference)->Apply(Loops)->UseManualTime()->Iterations(1);
 BENCHMARK(FreeSimulation)->Apply(Loops)->UseManualTime()->Iterations(1);
-BENCHMARK(BareMjStep)->Apply(Loops);
 
 }  // namespace
 }  // namespace mbv

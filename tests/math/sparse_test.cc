@@ -1,7 +1,9 @@
 // Factors, ranks and least-norm solutions of sparse matrices against Eigen's dense ones.
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <random>
 
 #include "math/sparse.h"
@@ -193,6 +195,78 @@ TEST(SparseLeastNorms, NeedRowsThatAreIndependentToTheTolerance) {
   SparseLeastNorm strict, loose;
   EXPECT_FALSE(strict.Factor(dense.sparseView(), 1e-3));
   EXPECT_TRUE(loose.Factor(dense.sparseView(), 1e-14));
+}
+
+// Forces between neighbours of a net of bodies, more than what holds them: three equations a body,
+// five forces a joint.
+SparseLu::Matrix ForcesOfNet(int width) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  std::vector<Eigen::Triplet<double>> entries;
+  int force = 0;
+  const auto join = [&](int a, int b) {
+    for (const int end = force + 5; force < end; ++force) {
+      for (int c = 0; c < 3; ++c) {
+        entries.emplace_back(3 * a + c, force, uniform(random));
+        entries.emplace_back(3 * b + c, force, uniform(random));
+      }
+    }
+  };
+  for (int i = 0; i < width; ++i) {
+    for (int j = 0; j < width; ++j) {
+      if (i + 1 < width) join(width * i + j, width * (i + 1) + j);
+      if (j + 1 < width) join(width * i + j, width * i + j + 1);
+    }
+  }
+  SparseLu::Matrix A(3 * width * width, force);
+  A.setFromTriplets(entries.begin(), entries.end());
+  return A;
+}
+
+// Bytes that work() leaves allocated: factors above all.
+template <typename Work>
+double BytesOf(const Work& work) {
+  const auto in_use = [] {
+    const struct mallinfo2 now = mallinfo2();
+    return static_cast<double>(now.uordblks + now.hblkhd);
+  };
+  const double before = in_use();
+  work();
+  return in_use() - before;
+}
+
+// By columns alone, or by the pattern of the matrix and its transpose, they are several times as
+// large.
+TEST(SparseFactors, OfNetsAreSmall) {
+  constexpr double kWeight = 0.05;
+  const SparseLu::Matrix A = ForcesOfNet(20);
+  SparseLeastNorm least;
+  const double of_bodies = BytesOf([&] { ASSERT_TRUE(least.Factor(A, 0.0)); });
+  std::vector<Eigen::Triplet<double>> entries;
+  const auto n = static_cast<int>(A.cols());
+  for (int c = 0; c < n; ++c) {
+    entries.emplace_back(c, c, kWeight);
+    for (SparseLu::Matrix::InnerIterator entry(A, c); entry; ++entry) {
+      entries.emplace_back(c, n + entry.row(), -entry.value());
+      entries.emplace_back(n + entry.row(), c, entry.value());
+    }
+  }
+  SparseLu::Matrix K(n + A.rows(), n + A.rows());
+  K.setFromTriplets(entries.begin(), entries.end());
+  SparseLu by_columns;
+  const double of_columns = BytesOf([&] { ASSERT_TRUE(by_columns.Factor(K)); });
+  EXPECT_LT(2.0 * of_bodies, of_columns);
+  EXPECT_LT(of_columns, 16e6);
+}
+
+TEST(SparseFactors, OfNetsSolveAsDenseOnes) {
+  const SparseLu::Matrix A = ForcesOfNet(6);
+  SparseLeastNorm least;
+  ASSERT_TRUE(least.Factor(A, 0.0));
+  VecX b(A.rows());
+  for (Eigen::Index k = 0; k < b.size(); ++k) b[k] = std::sin(1.7 * static_cast<double>(k));
+  const VecX dense = MatX(A).completeOrthogonalDecomposition().solve(b);
+  EXPECT_LT((least.LeastNorm(b) - dense).norm(), 1e-11 * dense.norm());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -83,6 +84,9 @@ class Statement {
   void BindNext(const std::string& value);
   void BindNext(const char* value) { BindNext(std::string(value)); }
   void BindNext(const Blob& value);
+  void BindNext(const std::vector<double>& values) {
+    for (const double value : values) BindNext(value);
+  }
 
   Database* database_;
   sqlite3_stmt* statement_ = nullptr;

@@ -136,9 +136,11 @@ std::string Framed(const char* kind, const char* id, const std::string& title,
 // What went wrong, what is gone, what drifted: each in one place, the worst first.
 std::string Boxes(const RegressReport& report, const std::vector<const CaseResult*>& cases) {
   std::vector<std::string> failed, missing, drifted;
-  for (const CaseResult* result : cases) {
-    const std::string link = fmt::format("<a href=\"#{}\">{}</a>", EscapeMarkup(RowId(*result)),
-                                         EscapeMarkup(result->key));
+  for (size_t i = 0; i < cases.size(); ++i) {
+    const CaseResult* result = cases[i];
+    const std::string page = i < kCasesOnAPage ? "" : IndexPageName(i / kCasesOnAPage);
+    const std::string link = fmt::format("<a href=\"{}#{}\">{}</a>", page,
+                                         EscapeMarkup(RowId(*result)), EscapeMarkup(result->key));
     if (result->failed()) {
       failed.push_back(fmt::format("{} <span class=\"word bad\">{}</span>: {}{}", link,
                                    EscapeMarkup(WordOf(*result)), EscapeMarkup(result->reason),
@@ -175,24 +177,54 @@ std::string Head(const RegressReport& report) {
   return text;
 }
 
+// Links to all pages, where there are several.
+std::string PageLinks(size_t page, size_t pages) {
+  if (pages < 2) return "";
+  std::string html =
+      "<nav class=\"soft\" aria-label=\"pages\">Each page has its own table, the "
+      "worst scenarios on the first. Page";
+  for (size_t k = 0; k < pages; ++k) {
+    html += k == page ? fmt::format(" <b aria-current=\"page\">{}</b>", k + 1)
+                      : fmt::format(" <a href=\"{}\">{}</a>", IndexPageName(k), k + 1);
+  }
+  return html + "</nav>\n";
+}
+
 }  // namespace
 
-std::string ToIndexHtml(const RegressReport& report,
-                        const std::map<std::string, std::string>& pictures) {
+std::string IndexPageName(size_t page) {
+  return page == 0 ? "index.html" : fmt::format("index-{}.html", page + 1);
+}
+
+std::vector<std::string> ToIndexPages(const RegressReport& report,
+                                      const std::map<std::string, std::string>& pictures) {
   const std::vector<const CaseResult*> cases = BySeverity(report);
-  TableData table;
-  for (const CaseResult* result : cases) table.Add(*result);
+  const size_t count = std::max<size_t>(1, (cases.size() + kCasesOnAPage - 1) / kCasesOnAPage);
   const std::string title =
       fmt::format("mbverify regression {}: {}", EscapeMarkup(report.run.started_utc),
                   ExitCodeOf(report) == 0 ? "all as expected" : "not as expected");
-  return FillPage(IndexPage(), {{"style_hash", CspHash(IndexStyle())},
-                                {"script_hash", CspHash(IndexScript())},
-                                {"title", title},
-                                {"style", IndexStyle()},
-                                {"head", Head(report)},
-                                {"boxes", Boxes(report, cases)},
-                                {"data", std::move(table).Write(pictures)},
-                                {"script", IndexScript()}});
+  std::vector<std::string> pages;
+  for (size_t page = 0; page < count; ++page) {
+    TableData table;
+    std::map<std::string, std::string> shown;
+    const size_t end = std::min(cases.size(), (page + 1) * kCasesOnAPage);
+    for (size_t i = page * kCasesOnAPage; i < end; ++i) {
+      table.Add(*cases[i]);
+      const std::string model = cases[i]->key.substr(0, cases[i]->key.find('/'));
+      if (const auto picture = pictures.find(model); picture != pictures.end()) {
+        shown.insert(*picture);
+      }
+    }
+    pages.push_back(FillPage(IndexPage(), {{"style_hash", CspHash(IndexStyle())},
+                                           {"script_hash", CspHash(IndexScript())},
+                                           {"title", title},
+                                           {"style", IndexStyle()},
+                                           {"head", Head(report) + PageLinks(page, count)},
+                                           {"boxes", page == 0 ? Boxes(report, cases) : ""},
+                                           {"data", std::move(table).Write(shown)},
+                                           {"script", IndexScript()}}));
+  }
+  return pages;
 }
 
 // Thumbnails: PNG → smaller PNG → data URI.

@@ -261,6 +261,9 @@ void AddTrouble(const std::string& text, RegressOutcome* outcome) {
 std::vector<std::string> RegressionFiles(const RegressOptions& options,
                                          const std::vector<std::string>& keys) {
   std::vector<std::string> names = {"index.html", "regress.json", kUnfinished};
+  for (size_t page = 1; page * kCasesOnAPage < keys.size(); ++page) {
+    names.push_back(IndexPageName(page));
+  }
   if (options.junit.empty()) names.emplace_back("junit.xml");
   if (options.markdown.empty()) names.emplace_back("summary.md");
   for (const auto& [name, content] : options.shared_files) names.push_back(name);
@@ -331,7 +334,13 @@ void FinishRegression(const RegressOptions& options, const RunFolder& folder,
   }
   // What merge reads is about whole results; the page says so as long as the rest is not.
   write("regress.json", ToJson(report));
-  write("index.html", ToIndexHtml(report, thumbnails));
+  size_t page = 0;
+  for (const std::string& html : ToIndexPages(report, thumbnails)) {
+    write(IndexPageName(page++), html);
+  }
+  // Of an earlier run with more of them.
+  std::error_code error;
+  while (fs::remove(folder.path() / IndexPageName(page), error)) ++page;
   if (whole) folder.Finished();
   outcome->exit_code = outcome->trouble.empty() ? ExitCodeOf(report) : 2;
 }

@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "features/regress/case_result.h"
 
@@ -22,10 +23,13 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// A summary for job pages: counts, what failed, what drifted, and the table of all scenarios.
 [[nodiscard]] std::string ToMarkdown(const RegressReport& report);
 
-/// One self-contained page; `pictures` are data URIs by model. Links go to <key>/report.html beside
-/// the page.
-[[nodiscard]] std::string ToIndexHtml(const RegressReport& report,
-                                      const std::map<std::string, std::string>& pictures);
+/// Self-contained pages, the worst cases first, so many on each that it stays below 2 MB;
+/// `pictures` are data URIs by model. Links go to <key>/report.html beside the pages.
+[[nodiscard]] std::vector<std::string> ToIndexPages(
+    const RegressReport& report, const std::map<std::string, std::string>& pictures);
+inline constexpr size_t kCasesOnAPage = 7000;
+/// Where page 0, 1 … lies: "index.html", "index-2.html" …
+[[nodiscard]] std::string IndexPageName(size_t page);
 
 /// What failed and drifted, then the counts, for a terminal.
 [[nodiscard]] std::string ToSummaryText(const RegressReport& report);

@@ -65,6 +65,16 @@ TEST(UpgradeRows, CallsOtherDifferencesUnexplained) {
   EXPECT_EQ(Whys(right, NewRows())[0], "nothing changed");
 }
 
+// Of slides and of planes that stay what they are.
+TEST(UpgradeRows, RoundOffIsNoVelocityTerm) {
+  RowSurvey survey = OldRows();
+  survey.states[0].state.qvel = Vec3(0.2, -1.0, 0.4);
+  survey.states[0].velocity_term = Vec3(2.6e-14, -1e-14, 0.0);
+  RowAnswer answer = NewRows();
+  answer.states[0] = survey.states[0].present;
+  for (const std::string& why : Whys(survey, answer)) EXPECT_EQ(why, "nothing changed");
+}
+
 TEST(UpgradeRows, AreComparedOnlyWhereTheyAreTheSame) {
   RowAnswer other = NewRows();
   other.equalities[0] = "close:z";
