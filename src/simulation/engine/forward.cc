@@ -771,11 +771,12 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   const LoopClock clock;
   if (friction.acts() && !steps.empty()) friction.FindSliding(steps.front());
   integrator.Start(first);
-  if (friction.acts()) {
-    if (RunSummary summary = friction.Begin(); !summary.ok()) return summary;
-  }
   s->FindShared();
   s->work.Start(s->WorkRates());
+  if (friction.acts()) {
+    if (RunSummary summary = friction.Begin(); !summary.ok()) return summary;
+    s->work.Jump(s->WorkRates());
+  }
   s->Record(0);
   if (RunSummary summary = TroubleAt(*s, 0.0); !summary.ok()) return summary;
   for (size_t i = 0; i < steps.size(); ++i) {
