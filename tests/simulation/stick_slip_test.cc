@@ -15,6 +15,7 @@
 namespace mbv {
 namespace {
 
+using fixtures::BouncingBlock;
 using fixtures::CoulombFriction;
 using fixtures::JumpingFriction;
 using fixtures::StackedBlocks;
@@ -226,13 +227,13 @@ TEST(SimulatedRigidStops, ABlockBouncesAsItsClosedFormAndRests) {
                 -energy, 1e-5 * energy);
     return Farthest(run.trace, "motor1.position", [&](double t) { return block.Position(t); });
   };
-  EXPECT_LT(error(), 1e-11);
+  EXPECT_LT(error(), 1e-10);  // where it rests, by the softness of the row that holds it
   m = BouncingBlock{.restitution = 0.6 * (1.0 + 1e-6)}.Make();
   EXPECT_GT(error(), 1e-8);
 }
 
 TEST(SimulatedRigidStops, WhatLeansLeavesWhereItWouldBePulled) {
-  const RatchetedBlock ratchet;
+  const fixtures::RatchetedBlock ratchet;
   Mechanism m = ratchet.Make();
   m.elements[0].law = StopLaw{.lower = 0.0, .restitution = 0.0};
   const double duration_s = ratchet.start() + ratchet.moves();

@@ -116,6 +116,7 @@ class StickSlip {
   std::vector<int> pieces_;      ///< of these, at the present node
   std::vector<double> rates_;    ///< of these, by (1)
   std::vector<std::pair<size_t, int>> ends_;  ///< of rigid stops
+  std::vector<double> closed_;                ///< per end: its gap at the node where that is closed
   std::vector<int> touch_;                    ///< per element: the end in touch, or 0
   EventLog log_;
   RunSummary trouble_ = RunSummary::Done();
@@ -253,7 +254,8 @@ RunSummary StickSlip::Strike(const std::vector<std::pair<size_t, int>>& hits, do
     const double rebound =
         -std::get<StopLaw>(s_.engine.mechanism->elements[e].law).restitution * rate;
     const bool is_hit = k < static_cast<Eigen::Index>(hits.size());
-    const bool rests = !is_hit || std::abs(rebound) <= s_.engine.elements[e].rest_rate;
+    const bool rests =
+        !is_hit || rate >= 0.0 || std::abs(rebound) <= s_.engine.elements[e].rest_rate;
     K.block(nv + rows + k, 0, 1, nv) = G.transpose() / largest;
     change[nv + rows + k] = ((rests ? 0.0 : rebound) - rate) / largest;
     closing.push_back(is_hit ? -rate : 0.0);
@@ -577,8 +579,12 @@ RunSummary StickSlip::Find(const Integrator::Node& node, double from_s, double h
     if (at < event->after_s) *event = {.after_s = at};
     if (sign != 0) event->starts.emplace_back(e, sign);
   }
-  for (const auto& [e, side] : hit) {
-    const double at = TimeOf(node, from_s, h, [&] { return GapTo(e, side) < 0.0; });
+  // Where it was hit last, the gap is closed but for round-off.
+  for (size_t k = 0; k < ends_.size(); ++k) {
+    const auto& [e, side] = ends_[k];
+    if (std::ranges::find(hit, ends_[k]) == hit.end()) continue;
+    const double at =
+        TimeOf(node, from_s, h, [&, of = e, to = side] { return GapTo(of, to) < closed_[k]; });
     if (at > event->after_s) continue;
     if (at < event->after_s) *event = {.after_s = at};
     event->hits.emplace_back(e, side);
@@ -598,6 +604,8 @@ RunSummary StickSlip::Advance(const Step& step) {
     const bool whole = from == step.from_s;
     const bool multistep = whole && std::min(step.uniform, uniform_) == 4;
     const Integrator::Node node = integrator_.Save();
+    closed_.clear();
+    for (const auto& [e, side] : ends_) closed_.push_back(std::min(0.0, GapTo(e, side)));
     if (RunSummary summary = Go(from, h, multistep); !summary.ok()) return summary;
     if (!integrator_.healthy() || !Ended()) {
       s_.work.Step(h, multistep, s_.WorkRates());
@@ -763,11 +771,12 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   const LoopClock clock;
   if (friction.acts() && !steps.empty()) friction.FindSliding(steps.front());
   integrator.Start(first);
-  if (friction.acts()) {
-    if (RunSummary summary = friction.Begin(); !summary.ok()) return summary;
-  }
   s->FindShared();
   s->work.Start(s->WorkRates());
+  if (friction.acts()) {
+    if (RunSummary summary = friction.Begin(); !summary.ok()) return summary;
+    s->work.Jump(s->WorkRates());
+  }
   s->Record(0);
   if (RunSummary summary = TroubleAt(*s, 0.0); !summary.ok()) return summary;
   for (size_t i = 0; i < steps.size(); ++i) {

@@ -402,6 +402,16 @@ void Integrator::SetFrictionRows(const VecX& v) {
     friction_R_[row] =
         std::min((1.0 - kMjcfImpedance) * d_->efc_diagApprox[rows + row], largest_friction_R_[row]);
     friction_aref_[row] = -bias - b_ * s_.system.FrictionJacobian(row).dot(v);
+    for (const size_t e : place.elements) {  // a rigid stop in touch, back to its end
+      const ForceElement& element = s_.engine.mechanism->elements[e];
+      if (!IsRigidStop(element) || s_.system.sliding().empty() || s_.system.sliding()[e] != 0) {
+        continue;
+      }
+      const auto& stop = std::get<StopLaw>(element.law);
+      const double q = ElementMotionOf(s_.system, e).position;
+      const double up = stop.upper - q, down = stop.lower - q;
+      friction_aref_[row] += k_ * (std::abs(up) < std::abs(down) ? up : down);
+    }
   }
 }
 
