@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <thread>
 #include <unordered_map>
@@ -184,6 +185,23 @@ class Flooder {
     return space.Close(from, space.Target(x), at) ? Fibre::Reach::kWhole : Fibre::Reach::kNone;
   }
 
+  // Whether the set is left on the way to another pose of it. Not looked for where the margin is
+  // that over a range.
+  [[nodiscard]] std::optional<PoseSpace::Gap> GapTo(const PoseSpace& space, const PlacedPose& from,
+                                                    const VecX& x, const PlacedPose& to,
+                                                    bool inside) const {
+    if (fibre_.any() || !inside || from.pose.margin.minCoeff() < 0.0) return std::nullopt;
+    const VecX start = from.pose.at, way = space.Target(x) - start;
+    return space.FindGap(
+        [&](double share, PlacedPose* at) { return space.Close(from, start + share * way, at); },
+        from.pose.margin, to.pose.margin, is_coarse_ ? 2 : 1);
+  }
+  [[nodiscard]] static int LeastOf(const VecX& margin) {
+    Eigen::Index least = 0;
+    margin.minCoeff(&least);
+    return static_cast<int>(least);
+  }
+
   [[nodiscard]] Corner Visit(const PoseSpace& space, const PlacedPose& from,
                              const Lattice& key) const {
     Corner corner;
@@ -197,7 +215,10 @@ class Flooder {
     const bool part = reach == Fibre::Reach::kPart;
     corner.inside = !part && least >= 0.0;
     corner.passes = corner.inside || (space.settings().for_all && at_start >= 0.0);
-    if (!corner.inside) {
+    if (const auto gap = GapTo(space, from, At(key), at, corner.inside)) {
+      corner.inside = corner.passes = false;
+      corner.bound = gap->at.pose.margin.size() > 0 ? LeastOf(gap->at.pose.margin) : -1;
+    } else if (!corner.inside) {
       corner.bound = part && least >= 0.0 ? FoldBound(at.pose.margin) : static_cast<int>(worst);
     }
     corner.pose = std::move(at.pose);
@@ -250,6 +271,7 @@ class Flooder {
       });
     }
     Complete(0, {cells_[0].begin(), cells_[0].end()});
+    is_coarse_ = false;
     set_.summary = RunSummary::Done();
   }
 
@@ -309,19 +331,18 @@ class Flooder {
     return a;
   }
 
-  // Corners of cells that were not visited, from the nearest one inside of the same cell's parent.
+  // Corners of cells that were not visited, from the nearest one inside of the same cell's parent
+  // without a gap between.
   void Complete(int level, const std::vector<Lattice>& cells) {
     const int spacing = SpacingAt(level);
-    std::map<Lattice, Lattice> wanted;  // and from where
+    std::map<Lattice, std::vector<std::pair<long, Lattice>>> wanted;  // and from where
     for (const Lattice& cell : cells) {
       ForEachCorner([&](const Lattice& offset) {
         const Lattice key = Sum(cell, offset, spacing);
         if (corners_.contains(key) || wanted.contains(key)) return;
-        const Lattice* best = nullptr;
-        long least = 0;
-        Lattice candidate{};
+        std::vector<std::pair<long, Lattice>> near;
         // Corners of this cell, and of the one that it is a part of.
-        for (int wider = 1; wider <= 2 && best == nullptr; ++wider) {
+        for (int wider = 1; wider <= 2 && near.empty(); ++wider) {
           const int s = spacing * wider;
           Lattice base = cell;
           if (wider == 2) {
@@ -336,20 +357,26 @@ class Flooder {
               const long d = other.at(c) - key.at(c);
               distance += d * d;
             }
-            if (best != nullptr && distance >= least) return;
-            candidate = other;
-            best = &candidate;
-            least = distance;
+            near.emplace_back(distance, other);
           });
         }
-        if (best != nullptr) wanted.emplace(key, candidate);
+        std::ranges::stable_sort(near, {}, &std::pair<long, Lattice>::first);
+        if (!near.empty()) wanted.emplace(key, std::move(near));
       });
     }
-    const std::vector<std::pair<Lattice, Lattice>> list(wanted.begin(), wanted.end());
+    const std::vector<std::pair<Lattice, std::vector<std::pair<long, Lattice>>>> list(
+        wanted.begin(), wanted.end());
     auto found = ForAll<Corner>(list.size(), [&](size_t i, PoseSpace& own) {
-      PlacedPose from;
-      const bool placed = own.Place(corners_.find(list[i].second)->second.pose, &from);
-      return placed ? Visit(own, from, list[i].first) : Corner();
+      Corner corner;
+      for (const auto& [distance, other] : list[i].second) {
+        PlacedPose from;
+        if (own.Place(corners_.find(other)->second.pose, &from)) {
+          corner = Visit(own, from, list[i].first);
+        }
+        const bool behind = corner.closes && !corner.passes && corner.pose.margin.minCoeff() >= 0.0;
+        if (!behind || fibre_.any()) break;
+      }
+      return corner;
     });
     for (size_t i = 0; i < list.size(); ++i) Take(list[i].first, std::move(found[i]));
   }
@@ -488,11 +515,16 @@ class Flooder {
                           : space.CloseNear(from, space.Target(x), &at);
     };
     if (Close(space, from, b, &at, &unused) == Fibre::Reach::kWhole) {
-      if (at.pose.margin.minCoeff() >= 0.0) {  // outside by another sheet
-        cut.share = 1.0;
-        return cut;
-      }
       margin_high = at.pose.margin;
+      if (margin_high.minCoeff() >= 0.0) {
+        const auto gap = GapTo(space, from, b, at, true);
+        if (!gap || !gap->open) {  // by another sheet, or where branches of a bound cross
+          cut.share = gap ? gap->share : 1.0;
+          return cut;
+        }
+        high = gap->share;
+        margin_high = gap->at.pose.margin;
+      }
     }
     // A fold is approached in steps that close, towards where the square of its margin would
     // vanish, which is linear there.
@@ -740,6 +772,7 @@ class Flooder {
   std::unordered_map<Edge, Cut, EdgeHash> cuts_;
   long closings_ = 0;
   int waves_ = 0;
+  bool is_coarse_ = true;
 };
 
 }  // namespace

@@ -25,6 +25,10 @@ constexpr double kTrusted = 0.5;     // a correction beyond this share of the st
 constexpr double kOverlap = 0.3;     // of the motions before and behind a step: det N₁ᵀ N₂
 constexpr double kSlopeStep = 1e-5;  // of difference quotients [rad, characteristic lengths]
 constexpr int kMostIterations = 14, kMostHalvings = 8;
+constexpr double kVanishes = 1e-9, kClosed = 1e-12;  // margins by those of a way's ends; roundings
+constexpr double kNearZero = 0.2;  // a parabola's least margin by that at its poses
+constexpr double kKnown = 0.05;    // margins as expected, by the largest ones
+constexpr int kMostGapHalvings = 10;
 
 Eigen::RowVectorXd Projected(const ScalarRow& row, const MatX& J) {
   return row.J_parent.transpose() * J.middleRows<6>(6 * row.parent) +
@@ -532,6 +536,64 @@ bool PoseSpace::Close(const PlacedPose& from, const VecX& target, PlacedPose* to
   }
   *to = std::move(at);
   return true;
+}
+
+PoseSpace::Between PoseSpace::Look(const VecX& a, const VecX& middle, const VecX& b,
+                                   const VecX& expected, const VecX& none) const {
+  Between between = Between::kInside;
+  for (Eigen::Index j = 0; j < middle.size(); ++j) {
+    // The least pivot has kinks, and is nowhere negative.
+    if (bounds_[static_cast<size_t>(j)].kind == SetBound::Kind::kConstraint) continue;
+    const double slope = 0.5 * (b[j] - a[j]), change = a[j] - 2 * middle[j] + b[j];
+    const double ends = std::min(a[j], b[j]);
+    const double most = std::max({a[j], b[j], middle[j]});
+    if (expected.size() > 0 && std::abs(middle[j] - expected[j]) > kKnown * most + none[j]) {
+      between = std::max(between, Between::kUnknown);
+    }
+    if (ends < none[j]) continue;  // along a bound, or from one
+    if (middle[j] < none[j]) return Between::kZero;
+    if (change <= 0.5 * std::abs(slope)) continue;  // least at an end
+    if (change <= std::abs(slope)) {
+      if (ends < kNearZero * middle[j]) between = std::max(between, Between::kUnknown);
+    } else if (middle[j] - 0.5 * slope * slope / change < kNearZero * ends) {
+      between = Between::kNearZero;
+    }
+  }
+  return between;
+}
+
+std::optional<PoseSpace::Gap> PoseSpace::FindGap(const Way& way, const VecX& margin_start,
+                                                 const VecX& margin_end, int halvings) const {
+  const VecX none = (kVanishes * margin_start.cwiseMax(margin_end)).array() + kClosed;
+  const auto search = [&](auto&& self, double a, const VecX& at_a, double b, const VecX& at_b,
+                          const VecX& expected, int depth) -> std::optional<Gap> {
+    Gap middle;
+    middle.share = 0.5 * (a + b);
+    if (!way(middle.share, &middle.at)) return middle;
+    const VecX margin = middle.at.pose.margin;
+    middle.open = (margin + none).minCoeff() < 0.0;
+    const Between between = Look(at_a, margin, at_b, expected, none);
+    if (middle.open || between == Between::kZero) return middle;
+    if (between == Between::kInside && depth >= halvings) return std::nullopt;
+    if (depth >= kMostGapHalvings) {  // it vanishes here, or at an end of the way
+      const bool is_end = between == Between::kUnknown && (a == 0.0 || b == 1.0);
+      return is_end ? std::nullopt : std::optional(middle);
+    }
+    // Halfway to both ends by the parabola.
+    const VecX lower = (3 * at_a + 6 * margin - at_b) / 8,
+               upper = (3 * at_b + 6 * margin - at_a) / 8;
+    auto gap = self(self, a, at_a, middle.share, margin, lower, depth + 1);
+    return gap ? gap : self(self, middle.share, margin, b, at_b, upper, depth + 1);
+  };
+  return search(search, 0.0, margin_start, 1.0, margin_end, VecX(), 1);
+}
+
+bool PoseSpace::CloseInside(const PlacedPose& from, const VecX& target, PlacedPose* to) const {
+  if (!Close(from, target, to) || to->pose.margin.minCoeff() <= 0.0) return false;
+  const VecX start = from.pose.at;
+  return !FindGap([&](double share,
+                      PlacedPose* at) { return Close(from, start + share * (target - start), at); },
+                  from.pose.margin, to->pose.margin);
 }
 
 VecX PoseSpace::Slope(const PlacedPose& at, int bound) const {

@@ -13,7 +13,9 @@
 // Neither way to a set of poses (flood.h, trace.h) uses more of the other than this file.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -172,6 +174,20 @@ class PoseSpace {
   [[nodiscard]] bool CloseNear(const PlacedPose& from, const VecX& target, PlacedPose* to) const {
     return CloseOnce(from, target, to) && to->type1 > 0.0;
   }
+  /// Where a way between two poses inside leaves the set, though: the first pose that is seen to be
+  /// outside, or the share of the way at which a margin vanishes and grows again.
+  struct Gap {
+    double share = kNan;
+    bool open = false;  ///< `at` is outside
+    PlacedPose at;
+  };
+  using Way = std::function<bool(double share, PlacedPose* at)>;
+  /// By margins at halves of the way, at least `halvings` times, and on where a parabola through
+  /// three of them comes near zero in between.
+  [[nodiscard]] std::optional<Gap> FindGap(const Way& way, const VecX& margin_start,
+                                           const VecX& margin_end, int halvings = 1) const;
+  /// Close() to a pose inside, with poses inside all the way.
+  [[nodiscard]] bool CloseInside(const PlacedPose& from, const VecX& target, PlacedPose* to) const;
   /// Free coordinates `x`, the held ones as they are to be.
   [[nodiscard]] VecX Target(const VecX& x) const;
 
@@ -208,6 +224,11 @@ class PoseSpace {
                                 Eigen::RowVectorXd* rate) const;
   [[nodiscard]] bool Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const;
   [[nodiscard]] bool CloseOnce(const PlacedPose& from, const VecX& target, PlacedPose* to) const;
+  /// Of margins between two poses, by parabolas through them and the one halfway, which may have
+  /// been expected; such as are below `none` are 0.
+  enum class Between { kInside, kUnknown, kNearZero, kZero };
+  [[nodiscard]] Between Look(const VecX& a, const VecX& middle, const VecX& b, const VecX& expected,
+                             const VecX& none) const;
   void Move(const VecX& scaled, SpacePose* pose) const;
 
   const Mechanism* mechanism_;

@@ -31,7 +31,8 @@ constexpr double kDip = 1e-8;        // the same between two nodes, by their pol
 constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
-constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
+constexpr double kFar = 200.0;   // a ray that goes on for so long has no end
+constexpr int kGapHalvings = 2;  // of a step, to see whether it leaves the set
 constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
 constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
 constexpr int kSpreadRows = 6;
@@ -123,6 +124,7 @@ const Chebyshev& Nodes() {
 struct Hit {
   PlacedPose at;
   int bound = -1;
+  bool is_crossing = false;  // of branches of the bound: the margin vanishes and grows again
 };
 
 Vec2 Turned(const VecX& v) { return {v[1], -v[0]}; }
@@ -165,8 +167,22 @@ class Tracer {
           return std::nullopt;
         }
       }
-      if (next.pose.margin.minCoeff() < 0.0) {
-        auto hit = Exit(at, along, h, next);
+      double out = h;
+      bool leaves = next.pose.margin.minCoeff() < 0.0;
+      if (!leaves) {
+        auto gap = GapWithin(at, h * along, next);
+        if (gap && !gap->open) {
+          trouble_ = "poses are lost where branches of a bound cross";
+          return CrossingAt(std::move(*gap));
+        }
+        if (gap) {
+          leaves = true;
+          out = gap->share * h;
+          next = std::move(gap->at);
+        }
+      }
+      if (leaves) {
+        auto hit = Exit(at, along, out, next);
         if (hit) return hit;
         h *= 0.5;  // it left the branch between both
         if (h >= kLeastStep) continue;
@@ -205,6 +221,18 @@ class Tracer {
                 std::vector<SpacePose>* inside);
 
  private:
+  [[nodiscard]] std::optional<PoseSpace::Gap> GapWithin(const PlacedPose& at, const VecX& step,
+                                                        const PlacedPose& next) const {
+    return space_.FindGap(
+        [&](double share, PlacedPose* to) { return space_.Step(at, share * step, to); },
+        at.pose.margin, next.pose.margin, kGapHalvings);
+  }
+  static std::optional<Hit> CrossingAt(PoseSpace::Gap gap) {
+    if (gap.at.pose.margin.size() == 0) return std::nullopt;
+    Eigen::Index least = 0;
+    gap.at.pose.margin.minCoeff(&least);
+    return Hit{std::move(gap.at), static_cast<int>(least), true};
+  }
   // The first bound between a pose inside and one that is not. Margins may vanish several times on
   // the way: again up to where the first root is, until no other one is negative there.
   std::optional<Hit> Exit(const PlacedPose& at, const VecX& along, double h, PlacedPose next) {
@@ -232,7 +260,13 @@ class Tracer {
       for (Eigen::Index j = 0; j < margin.size(); ++j) {
         inside = inside && (j == hit.bound || margin[j] >= -kBeyond);
       }
-      if (inside) return hit;
+      if (inside) {
+        auto gap = GapWithin(at, first * along, hit.at);
+        if (!gap) return hit;
+        if (!gap->open) return CrossingAt(std::move(*gap));
+        first *= gap->share;
+        hit.at = std::move(gap->at);
+      }
       h = first;
       next = std::move(hit.at);
     }
@@ -674,12 +708,12 @@ bool Tracer::Probe(const std::vector<Vec2>& points, TracedSection* section,
     VecX target = nearest->at;
     target.head<2>() = p;
     if (!space_.Place(*nearest, &from)) continue;
-    if (space_.Close(from, target, &to) && to.pose.margin.minCoeff() > 0.0) {
+    if (space_.CloseInside(from, target, &to)) {
       inside->push_back(to.pose);
       continue;
     }
     const auto hit = Walk(from, p - Vec2(from.pose.at.head<2>()));
-    if (!hit || Knows(section->loops, *hit)) continue;
+    if (!hit || hit->is_crossing || Knows(section->loops, *hit)) continue;
     trouble_.clear();
     TracedLoop loop = Trace(*hit);
     if (!loop.closed) return false;
@@ -696,6 +730,7 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
   std::vector<Hit> chords;  // a pose of each loop
   std::vector<std::pair<Hit, std::string>> lost;
   const auto offer = [&](const Hit& hit) {
+    if (hit.is_crossing) return false;
     if (Knows(section->loops, hit)) return true;
     trouble_.clear();
     TracedLoop loop = Trace(hit);
@@ -941,8 +976,7 @@ class SolidTracer {
         PlacedPose from, to;
         VecX target = pose.at;
         target[2] = height;
-        if (flat.Place(pose, &from) && flat.Close(from, target, &to) &&
-            to.pose.margin.minCoeff() > 0.0) {
+        if (flat.Place(pose, &from) && flat.CloseInside(from, target, &to)) {
           seeds.push_back(std::move(to));
         }
       }
@@ -1039,8 +1073,8 @@ class SolidTracer {
       PlacedPose from, to;
       VecX target = pose.at;
       target[2] = section.height;
-      if (tracer.space().Place(pose, &from) && tracer.space().Close(from, target, &to) &&
-          to.pose.margin.minCoeff() > 0.0 && !IsInside(section.loops, to.pose.at.head<2>())) {
+      if (tracer.space().Place(pose, &from) && tracer.space().CloseInside(from, target, &to) &&
+          !IsInside(section.loops, to.pose.at.head<2>())) {
         seeds.push_back(std::move(to));
       }
     }
@@ -1288,7 +1322,7 @@ std::vector<TracedArc> TraceInside(const PoseSpace& space, int bound,
     if (!space.Place(in, &from)) continue;
     const VecX ray = (out.at - in.at).head(2);
     const auto hit = tracer.Walk(from, ray);
-    if (!hit || hit->bound != bound || tracer.Knows(found, *hit)) continue;
+    if (!hit || hit->bound != bound || hit->is_crossing || tracer.Knows(found, *hit)) continue;
     for (const int open : {1, -1}) {
       TracedLoop part = tracer.Trace(*hit, open);
       if (part.arcs.empty()) continue;
