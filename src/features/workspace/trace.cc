@@ -169,20 +169,15 @@ class Tracer {
       }
       double out = h;
       bool leaves = next.pose.margin.minCoeff() < 0.0;
-      if (!leaves) {
-        auto gap = GapWithin(at, h * along, next);
-        if (gap && !gap->open) {
-          trouble_ = "poses are lost where branches of a bound cross";
-          return CrossingAt(std::move(*gap));
-        }
-        if (gap) {
-          leaves = true;
-          out = gap->share * h;
-          next = std::move(gap->at);
-        }
+      std::optional<PoseSpace::Gap> gap;
+      if (!leaves) gap = GapWithin(at, h * along, next);
+      if (gap && gap->open) {
+        leaves = true;
+        out = gap->share * h;
+        next = std::move(gap->at);
       }
-      if (leaves) {
-        auto hit = Exit(at, along, out, next);
+      if (leaves || gap) {
+        auto hit = leaves ? Exit(at, along, out, next) : CrossingAt(std::move(*gap));
         if (hit) return hit;
         h *= 0.5;  // it left the branch between both
         if (h >= kLeastStep) continue;
