@@ -27,7 +27,9 @@ constexpr double kCutShare = 1e-4;  // of an edge, to which a cut is found
 constexpr int kMostCuts = 30;
 constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]; of a plan
 constexpr int kMostStrides = 10000;
+constexpr int kFewStrides = 8, kMostShorter = 4;         // shorter ones where a set is small
 constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
+constexpr double kAtCrossing = 1e-9;  // the same, at a corner: it lies where branches cross
 constexpr double kGibibyte = 1073741824.0, kMostCorners = 4e6;
 constexpr double kOverhead = 200.0;   // bytes of a corner beside its pose: key, node, allocations
 constexpr size_t kKeptAtOnce = 1024;  // of corners or cuts that are kept at once
@@ -192,9 +194,16 @@ class Flooder {
                                                     bool inside) const {
     if (fibre_.any() || !inside || from.pose.margin.minCoeff() < 0.0) return std::nullopt;
     const VecX start = from.pose.at, way = space.Target(x) - start;
+    for (size_t b = 0; b < space.bounds().size(); ++b) {
+      const auto j = static_cast<Eigen::Index>(b);
+      if (IsSingularity(space.bounds()[b].kind) &&
+          to.pose.margin[j] < kAtCrossing * from.pose.margin[j]) {
+        return PoseSpace::Gap{1.0, false, to};
+      }
+    }
     return space.FindGap(
         [&](double share, PlacedPose* at) { return space.Close(from, start + share * way, at); },
-        from.pose.margin, to.pose.margin, is_coarse_ ? 2 : 1);
+        from.pose.margin, to.pose.margin);
   }
   [[nodiscard]] static int LeastOf(const VecX& margin) {
     Eigen::Index least = 0;
@@ -271,7 +280,6 @@ class Flooder {
       });
     }
     Complete(0, {cells_[0].begin(), cells_[0].end()});
-    is_coarse_ = false;
     set_.summary = RunSummary::Done();
   }
 
@@ -520,6 +528,7 @@ class Flooder {
         const auto gap = GapTo(space, from, b, at, true);
         if (!gap || !gap->open) {  // by another sheet, or where branches of a bound cross
           cut.share = gap ? gap->share : 1.0;
+          if (gap && gap->at.pose.margin.size() > 0) cut.bound = LeastOf(gap->at.pose.margin);
           return cut;
         }
         high = gap->share;
@@ -772,7 +781,6 @@ class Flooder {
   std::unordered_map<Edge, Cut, EdgeHash> cuts_;
   long closings_ = 0;
   int waves_ = 0;
-  bool is_coarse_ = true;
 };
 
 }  // namespace
@@ -787,32 +795,38 @@ FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodS
   long poses = 0;
   const Fibre fibre(space.settings());
   constexpr Fibre::Reach none = Fibre::Reach::kNone;
-  for (int c = 0; c < k; ++c) {
-    double reach = 0.0;
-    for (const double sign : {-1.0, 1.0}) {
-      PlacedPose at = home;
-      const double step = kStride * space.UnitOf(c);
-      int count = 0;
-      for (; count < kMostStrides; ++count, ++poses) {
-        VecX target = at.pose.at;
-        target[c] += sign * step;
-        PlacedPose next;
-        double at_start = 0.0;
-        const bool closes = fibre.any()
-                                ? fibre.At(space, at, target.head(k), &next, &at_start) != none
-                                : space.Close(at, target, &next);
-        if (!closes) break;
-        const bool all = fibre.any() && space.settings().for_all;
+  // Strides to a bound on one side.
+  const auto strides = [&](int c, double step) {
+    PlacedPose at = home;
+    int count = 0;
+    for (; count < kMostStrides; ++count, ++poses) {
+      VecX target = at.pose.at;
+      target[c] += step;
+      PlacedPose next;
+      double at_start = 0.0;
+      if (fibre.any()) {
+        if (fibre.At(space, at, target.head(k), &next, &at_start) == none) break;
+        const bool all = space.settings().for_all;
         if ((all ? at_start : next.pose.margin.minCoeff()) < 0.0) break;
-        at = std::move(next);
+      } else if (!space.CloseInside(at, target, &next)) {
+        break;
       }
-      if (count == kMostStrides) {
+      at = std::move(next);
+    }
+    return count;
+  };
+  for (int c = 0; c < k; ++c) {
+    double step = kStride * space.UnitOf(c), reach = 0.0;
+    for (int i = 0; i < kMostShorter; ++i, step *= 0.25) {
+      const int back = strides(c, -step), on = strides(c, step);
+      if (std::max(back, on) == kMostStrides) {
         plan.summary.stop = Stop::kUnreachable;
         plan.summary.message = "the set has no end: no range, box or singularity bounds " +
                                space.settings().coordinates[static_cast<size_t>(c)].name;
         return plan;
       }
-      reach += step * (count + 0.5);
+      reach = step * (back + on + 1.0);
+      if (back + on >= kFewStrides) break;
     }
     plan.step.at(static_cast<size_t>(c)) = kRoom * reach / resolution;
     cells *= kRoom * resolution;

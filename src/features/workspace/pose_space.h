@@ -182,10 +182,10 @@ class PoseSpace {
     PlacedPose at;
   };
   using Way = std::function<bool(double share, PlacedPose* at)>;
-  /// By margins at halves of the way, at least `halvings` times, and on where a parabola through
-  /// three of them comes near zero in between.
+  /// By margins at quarters of the way, and on to the least one where interpolation comes near
+  /// zero.
   [[nodiscard]] std::optional<Gap> FindGap(const Way& way, const VecX& margin_start,
-                                           const VecX& margin_end, int halvings = 1) const;
+                                           const VecX& margin_end) const;
   /// Close() to a pose inside, with poses inside all the way.
   [[nodiscard]] bool CloseInside(const PlacedPose& from, const VecX& target, PlacedPose* to) const;
   /// Free coordinates `x`, the held ones as they are to be.
@@ -224,11 +224,6 @@ class PoseSpace {
                                 Eigen::RowVectorXd* rate) const;
   [[nodiscard]] bool Finish(const MatX& N_before, Rows* rows, PlacedPose* to) const;
   [[nodiscard]] bool CloseOnce(const PlacedPose& from, const VecX& target, PlacedPose* to) const;
-  /// Of margins between two poses, by parabolas through them and the one halfway, which may have
-  /// been expected; such as are below `none` are 0.
-  enum class Between { kInside, kUnknown, kNearZero, kZero };
-  [[nodiscard]] Between Look(const VecX& a, const VecX& middle, const VecX& b, const VecX& expected,
-                             const VecX& none) const;
   void Move(const VecX& scaled, SpacePose* pose) const;
 
   const Mechanism* mechanism_;

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <random>
 
 #include "analytic/scara_robot/workspace.h"
 #include "analytic/spr_tripod/workspace.h"
@@ -102,17 +103,6 @@ outputs: {tip: fore.end}
 
 TEST(ReachableSet, AnArmsTipReachesARing) {
   ExpectMeasure(Ask(FromText(Arm()), Over({"x", "y"})), pi * (0.49 - 0.09), 1e-10);
-}
-
-// A wheel comes back after four rounds only: many poses of the mechanism for one of the tip.
-TEST(ReachableSet, ABoundaryThatPosesGoRoundSeveralTimesCountsOnce) {
-  std::string text = Arm(R"(
-couplings: {gear: {joint: wheel, follows: shoulder, ratio: 1/4}}
-)");
-  text.insert(text.find("joints:"), "  wheel: {mass: 1, inertia: [0.01, 0.01, 0.01]}\n");
-  text.insert(text.find("drives:"),
-              "  wheel: {kind: revolute, parent: world, child: wheel, axis: z, guess_deg: 5}\n");
-  ExpectMeasure(Ask(FromText(text), Over({"x", "y"})), pi * (0.49 - 0.09), 1e-10);
 }
 
 // Files of robots state no outputs: bodies and frames have poses, too.
@@ -609,30 +599,68 @@ double PlatformSection(const Mechanism& platform, double z, double stretch) {
     return inside;
   };
   // Six sectors between the axes are alike.
-  return 6 * boost::math::quadrature::gauss<double, 30>::integrate(
-                 [&](double phi) { return 0.5 * std::pow(radius(phi), 2); }, 0.0, pi / 3);
+  double sixth = 0.0;
+  for (int k = 0; k < 4; ++k) {
+    sixth += boost::math::quadrature::gauss<double, 30>::integrate(
+        [&](double phi) { return 0.5 * std::pow(radius(phi), 2); }, k * pi / 12, (k + 1) * pi / 12);
+  }
+  return 6 * sixth;
 }
 
 // Near home many branches are close: margins are a thousand times as large as at home, the set a
-// hundredth of the mechanism.
+// hundredth of the mechanism. The lowest one lies just above the height at which home is singular.
 TEST(ReachableSet, PartsThatTouchAtASingularPoseAreNotReached) {
   const Mechanism platform = ShippedModel("stabilizing_platform");
-  SetArguments arguments = Over({"x", "y"}, 120);
-  arguments.at = {"z=0.93"};
-  const Answer answer = Ask(platform, arguments);
-  const double area = PlatformSection(platform, 0.93, 1.0);
-  ExpectMeasure(answer, area, 1e-6 * area);
-  // The smallest of the six parts beyond would show, and a platform wider by 1e-5 of it, too.
-  EXPECT_GT(2.7e-4, 10 * answer.set.flooded.error);
-  EXPECT_GT(std::abs(PlatformSection(platform, 0.93, 1.00001) - area), 1e-4 * area);
-  for (const char* height : {"z=0.905", "z=0.911688"}) {
-    arguments = Over({"x", "y"}, 240);
-    arguments.at = {height};
-    const Answer other = Ask(platform, arguments);
-    ASSERT_TRUE(other.set.summary.ok()) << height << " " << other.set.verdict;
-    EXPECT_TRUE(other.set.agree) << height << " " << other.set.verdict;
-    EXPECT_LT(other.set.traced.error, 1e-8 * other.set.traced.measure);
+  for (const double z : {0.911688, 0.92, 0.93, 0.95, 0.97}) {
+    SetArguments arguments = Over({"x", "y"}, 60);
+    arguments.at = {fmt::format("z={}", z)};
+    const Answer answer = Ask(platform, arguments);
+    const double area = PlatformSection(platform, z, 1.0);
+    SCOPED_TRACE(arguments.at.front());
+    ExpectMeasure(answer, area, 1e-6 * area);
+    EXPECT_LT(answer.set.traced.error, 1e-8 * area);
+    // A twentieth of it beyond a crossing would show, and so would a platform wider by 1e-5.
+    EXPECT_LT(answer.set.flooded.error, 0.01 * area);
+    EXPECT_GT(std::abs(PlatformSection(platform, z, 1.00001) - area), 5e-6 * area);
   }
+}
+
+// Margins along a way: (t − r)² q(t) + c, q positive, with the least value c at a random share r.
+TEST(ReachableSet, AWayLeavesTheSetWhereItsLeastMarginVanishes) {
+  const Mechanism arm = FromText(Arm());
+  Diagnostics diagnostics;
+  const auto question = ReadQuestion(arm, Over({"x", "y"}), &diagnostics);
+  ASSERT_TRUE(question.has_value()) << diagnostics.Text();
+  PoseSpace space(arm, question->settings);
+  ASSERT_FALSE(space.bounds().empty());
+  const auto bound = static_cast<Eigen::Index>(space.bounds().size()) - 1;
+  ASSERT_NE(space.bounds().back().kind, SetBound::Kind::kConstraint);
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> share(0.02, 0.98), bend(-0.9, 0.9), power(-4.0, 1.0);
+  int found = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const double r = share(random), b = bend(random), d = bend(random);
+    const double scale = std::pow(10.0, power(random));
+    for (const double c : {0.0, -1e-6, 1e-6}) {
+      const auto margins = [&](double t) {
+        VecX margin = VecX::Ones(static_cast<Eigen::Index>(space.bounds().size()));
+        margin[bound] = scale * (std::pow(t - r, 2) * (1.0 + b * t) * (1.0 + d * t * t) + c);
+        return margin;
+      };
+      const auto gap = space.FindGap(
+          [&](double t, PlacedPose* at) {
+            at->pose.margin = margins(t);
+            return true;
+          },
+          margins(0.0), margins(1.0));
+      SCOPED_TRACE(fmt::format("r = {}, b = {}, d = {}, c = {}", r, b, d, c));
+      ASSERT_EQ(gap.has_value(), c <= 0.0);
+      if (!gap) continue;
+      ++found;
+      EXPECT_NEAR(gap->share, r, 2e-3);
+    }
+  }
+  EXPECT_EQ(found, 6000);
 }
 
 // A flood that takes one stroke to be longer disagrees with the boundary.
