@@ -29,6 +29,9 @@ constexpr double kMostError = 0.2;  // of both ways together, by the measure
 constexpr double kLong_s = 10.0;    // what takes longer is announced
 constexpr double kSamePose = 1e-8;  // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
+constexpr const char* kNameOne =
+    "name a body or a frame by --output, joints or drives by --over, or state outputs: in the "
+    "model";
 
 // "leg1_mm=500:750" → name, SI values.
 struct Assigned {
@@ -78,10 +81,7 @@ class QuestionReader {
     if (arguments_.output.empty()) {
       output_ = m.outputs.empty() ? "" : m.outputs.front().name;
       if (m.outputs.empty() && arguments_.over.empty()) {
-        Error(
-            m.file, "the model has no output, whose poses could be asked",
-            "name a body or a frame by --output, joints or drives by --over, or state outputs: in "
-            "the model");
+        Error(m.file, "the model has no output, whose poses could be asked", kNameOne);
       }
       return !failed_;
     }
@@ -140,6 +140,13 @@ class QuestionReader {
     result.unit = named.unit;
     if (of_coordinate) {
       const NamedCoordinate* found = Find(named.name);
+      if (found == nullptr && output_.empty() &&
+          std::ranges::find(kComponents, named.name) != kComponents.end()) {
+        Error(result.text,
+              fmt::format("the model has no output, whose '{}' could be asked", named.name),
+              kNameOne);
+        return std::nullopt;
+      }
       if (found == nullptr) {
         const std::vector<std::string> names = NamesOf(known_);
         Error(result.text, fmt::format("there is no coordinate '{}'", named.name),

@@ -115,6 +115,7 @@ TEST_F(WorkspaceCommand, BadInputIsRefusedWithExitCode2) {
            {"four_bar --over x,qq", "there is no coordinate 'qq'"},
            {"four_bar --over x --at y=0", "'coupler.y' is no coordinate of its own at home"},
            {"floating_loop", "has no end"},
+           {"flyball_governor --over x,y", "the model has no output, whose 'x' could be asked"},
            {"friction_five_bar --resolution 90000", "takes about"},
            {"friction_five_bar --joint-space --over x,y", "two drives are needed"},
            {"stewart --modes drives --resolution 40", "another thing than a set"},
