@@ -7,4 +7,5 @@
 #SBATCH --mem=1G
 #SBATCH --time=00:30:00
 set -u
-mbverify study merge "$2"/shards/*.shard-*-of-"$1" -o "$2"
+read -ra mbverify <<<"${MBVERIFY:-mbverify}"
+"${mbverify[@]}" study merge "$2"/shards/*.shard-*-of-"$1" -o "$2"

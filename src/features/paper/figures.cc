@@ -428,7 +428,7 @@ class FigureSource {
     RunStudyOptions run;
     run.out_dir = scratch.path().string();
     run.points.jobs = AllCores();
-    run.points.progress = [&](std::uint64_t done, std::uint64_t all) {
+    run.points.progress = [&](std::uint64_t done, std::uint64_t all, double /*cpu_s*/) {
       if (options_.progress) {
         options_.progress("points", static_cast<double>(done) / static_cast<double>(all));
       }

@@ -23,8 +23,8 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// A summary for job pages: counts, what failed, what drifted, and the table of all scenarios.
 [[nodiscard]] std::string ToMarkdown(const RegressReport& report);
 
-/// Self-contained pages, the worst cases first, so many on each that it stays below 2 MB;
-/// `pictures` are data URIs by model. Links go to <key>/report.html beside the pages.
+/// Self-contained pages below 2 MB, kCasesOnAPage on each, the worst first; `pictures` are data
+/// URIs by model. Links go to <key>/report.html beside the pages.
 [[nodiscard]] std::vector<std::string> ToIndexPages(
     const RegressReport& report, const std::map<std::string, std::string>& pictures);
 inline constexpr size_t kCasesOnAPage = 7000;

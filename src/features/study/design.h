@@ -58,6 +58,10 @@ struct Design {
   /// Of kSobol and kLatinHypercube, between normal numbers; their matrix is positive definite.
   std::vector<Correlation> correlations = {};
 
+  /// The first points of a larger number are the same ones.
+  [[nodiscard]] bool grows() const {
+    return kind == DesignKind::kSobol || kind == DesignKind::kSaltelli;
+  }
   /// Points are drawn from the distributions, so that shares of them estimate probabilities.
   [[nodiscard]] bool draws() const {
     return kind == DesignKind::kSobol || kind == DesignKind::kSaltelli ||

@@ -20,6 +20,7 @@
 #include "cli/cli.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
+#include "features/regress/database.h"
 #include "features/regress/find_cases.h"
 #include "features/study/study_bench.h"
 #include "features/study/study_file.h"
@@ -256,19 +257,88 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
   if (!loaded.bench) return outcome;
   const StudyBench& bench = *loaded.bench;
   const StudyShare& share = options.points.share;
-  StudyFolder folder(
-      options.out_dir,
-      {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share, {}});
+  StudyFolder folder(options.out_dir, {bench.study().name,
+                                       file,
+                                       bench.fingerprint(),
+                                       options.reading.drawn,
+                                       share,
+                                       {},
+                                       bench.study().design.count});
   if (options.resume) {
     if (auto finished = Finished(bench, folder, share, outcome)) return *std::move(finished);
   }
-  if (auto refused = folder.Open(options.resume)) {
+  if (auto refused = folder.Open(options.resume, &bench)) {
     return Refused(std::move(outcome), *std::move(refused));
   }
   const std::string trouble =
       ComputePoints(bench, options.points, FindDone(bench, share, folder.path()), folder.path());
   if (!trouble.empty()) return NotWritten(std::move(outcome), trouble, "");
   return Finish(bench, share.count == 1, &folder, std::move(outcome));
+}
+
+StudyOutcome RunStudyUntil(const std::string& file, RunStudyOptions options, double width) {
+  constexpr std::uint64_t kFirst = 64;
+  StudyOutcome outcome;
+  const StudyResult read = LoadStudy(file, options.reading);
+  if (!read.study || !read.study->design.grows()) {
+    outcome.diagnostics.Append(read.diagnostics);
+    return read.study ? Refused(std::move(outcome), file, "--width: no design that grows",
+                                "design: {sobol: 65536} or {saltelli: 4096}")
+                      : Refused(std::move(outcome), file, "is not computed");
+  }
+  const Study& study = *read.study;
+  std::uint64_t count = std::min(kFirst, study.design.count);
+  // Where an earlier run ended, rather than at the beginning.
+  for (const char* left : {".part", ""}) {
+    const auto identity = ReadIdentity(fs::path(options.out_dir) / (study.name + left));
+    if (!options.resume || !identity) continue;
+    count = std::clamp(identity->size, count, study.design.count);
+    break;
+  }
+  for (;; count = std::min(2 * count, study.design.count), options.resume = true) {
+    options.reading.drawn.count = count;
+    outcome = RunStudy(file, options);
+    if (!outcome.report || count == study.design.count) return outcome;
+    const double widest = WidestInterval(outcome.report->summary);
+    if (std::isnan(widest)) {
+      outcome.exit_code = 2;
+      outcome.diagnostics.AddError(file, "--width: the study has no interval",
+                                   "limits of a sobol design, and indices of saltelli have one");
+      return outcome;
+    }
+    if (widest <= width) return outcome;
+  }
+}
+
+std::string WriteSqlite(const fs::path& folder, const Study& study, const std::string& file) {
+  std::error_code error;
+  if (fs::exists(file, error)) return file + " exists";
+  Database database(file, Database::Mode::kCreate);
+  std::string columns, places;
+  const auto column = [&](const std::string& name, const char* type) {
+    std::string quoted;
+    for (const char c : name) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    columns += fmt::format("{}\"{}\" {}", columns.empty() ? "" : ", ", quoted, type);
+    places += places.empty() ? "?" : ", ?";
+  };
+  column("point", "INTEGER PRIMARY KEY");
+  column("seed", "INTEGER");
+  column("exit", "INTEGER");
+  column("reason", "TEXT");
+  for (const Factor& factor : study.factors) column(factor.name, "REAL");
+  for (const StudyQuantity& quantity : study.quantities) column(quantity.name, "REAL");
+  database.Run("BEGIN; CREATE TABLE points (" + columns + ")");
+  {
+    Statement insert(&database, "INSERT INTO points VALUES (" + places + ")");
+    RowsOf(folder / kPointsFile, study)([&](const PointRow& row) {
+      insert
+          .Bind(static_cast<long>(row.point), static_cast<long>(study.design.seed), row.exit_code,
+                row.reason, row.varied, row.values)
+          .Execute();
+    });
+  }
+  database.Run("COMMIT");
+  return database.trouble();
 }
 
 StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::string& out_dir) {
@@ -293,8 +363,13 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
     return Refused(std::move(outcome), *std::move(refused));
   }
   // By its own name: the one in the shards' files may be anything.
-  StudyFolder folder(out_dir,
-                     {bench.study().name, first.file, first.fingerprint, first.drawn, {}, {}});
+  StudyFolder folder(out_dir, {bench.study().name,
+                               first.file,
+                               first.fingerprint,
+                               first.drawn,
+                               {},
+                               {},
+                               bench.study().design.count});
   if (auto refused = folder.Open(true)) return Refused(std::move(outcome), *std::move(refused));
   const std::string trouble = merger.Join(bench, folder.path());
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
@@ -382,7 +457,7 @@ FileContent ContentOf(const fs::path& path, std::uint64_t* size) {
 }
 
 StudyIdentity IdentityOf(const JsonValue& json) {
-  StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}, {}};
+  StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}};
   if (json.contains("count")) identity.drawn.count = json.at("count").get<std::uint64_t>();
   if (json.contains("seed")) identity.drawn.seed = json.at("seed").get<std::uint64_t>();
   const JsonValue shard = json.at("shard");
@@ -392,6 +467,7 @@ StudyIdentity IdentityOf(const JsonValue& json) {
     shard.Refuse(fmt::format("says {} of {}", identity.share.index + 1, identity.share.count));
   }
   identity.points = json.value("points", "");
+  if (json.contains("size")) identity.size = json.at("size").get<std::uint64_t>();
   return identity;
 }
 
@@ -409,7 +485,8 @@ std::string ToJson(const StudyIdentity& identity) {
                                  {"file", identity.file},
                                  {"fingerprint", identity.fingerprint},
                                  {"shard", {identity.share.index + 1, identity.share.count}},
-                                 {"points", identity.points}};
+                                 {"points", identity.points},
+                                 {"size", identity.size}};
   if (identity.drawn.count) json["count"] = *identity.drawn.count;
   if (identity.drawn.seed) json["seed"] = *identity.drawn.seed;
   return Dump(json);
@@ -444,7 +521,27 @@ StudyFolder::~StudyFolder() {
   if (lock_ >= 0) close(lock_);
 }
 
-std::optional<Finding> StudyFolder::Open(bool resume) {
+// Points of a design that grows are those of fewer ones and more: rows that are there stay.
+bool StudyFolder::TakeFewer(const StudyBench& bench) {
+  if (!bench.study().design.grows()) return false;
+  const auto is_part = [&](const std::optional<StudyIdentity>& of) {
+    return of && of->size < identity_.size && of->share.index == identity_.share.index &&
+           of->share.count == identity_.share.count &&
+           of->fingerprint == bench.FingerprintOf(of->size);
+  };
+  const auto left = ReadIdentity(path_), finished = ReadIdentity(target_);
+  if (!is_part(left)) {
+    const bool whole = is_part(finished) && PointsFingerprint(target_) == finished->points;
+    std::error_code error;
+    if (!whole || !fs::is_empty(path_, error)) return false;
+    for (const char* grown : {kPointsFile, kForcesFile}) {
+      if (!fs::copy_file(target_ / grown, path_ / grown, error)) return false;
+    }
+  }
+  return WriteFile(path_ / kStudyFile, ToJson(identity_)).empty();
+}
+
+std::optional<Finding> StudyFolder::Open(bool resume, const StudyBench* bench) {
   const auto refused = [&](std::string why, std::string hint) {
     return Finding{.file = path_.string(), .message = std::move(why), .hint = std::move(hint)};
   };
@@ -460,6 +557,7 @@ std::optional<Finding> StudyFolder::Open(bool resume) {
                        (held ? "another process computes this study there" : std::strerror(errno)),
                    elsewhere);
   }
+  if (resume && bench != nullptr && TakeFewer(*bench)) return {};
   std::optional<Finding> damage;
   const auto left = is_new ? std::nullopt : ReadIdentity(path_, &damage);
   if (damage) {
@@ -517,7 +615,8 @@ using StudyClock = std::chrono::steady_clock;
 
 struct StudyArguments {
   std::vector<std::string> files, folders;
-  std::string out = "out", shard;
+  std::string out = "out", shard, sqlite;
+  std::optional<double> width;
   RunStudyOptions options;
   JsonOption json;
 };
@@ -528,14 +627,15 @@ class StudyProgress {
  public:
   explicit StudyProgress(std::string name) : name_(std::move(name)) {}
 
-  void Report(std::uint64_t done, std::uint64_t all) {
+  void Report(std::uint64_t done, std::uint64_t all, double cpu_s) {
     constexpr double kBetween_s = 30.0;
     if (first_ == 0) first_ = done;
     const double elapsed = Since(start_);
     const double left = done > first_ ? elapsed / static_cast<double>(done - first_) *
                                             static_cast<double>(all - done)
                                       : 0.0;
-    const std::string text = fmt::format("{}: {} of {} points", name_, done, all);
+    const std::string text = fmt::format("{}: {} of {} points, {:.3g} ms of processor time each",
+                                         name_, done, all, 1e3 * cpu_s);
     if (line_.active()) {
       line_.Show(text, static_cast<double>(done) / static_cast<double>(all));
     } else if (Since(reported_) > kBetween_s) {
@@ -593,6 +693,9 @@ int RunStudies(StudyArguments arguments) {
     arguments.options.points.share = {static_cast<std::uint64_t>(shard->index - 1),
                                       static_cast<std::uint64_t>(shard->count)};
   }
+  if (arguments.width && !arguments.shard.empty()) {
+    return Refuse("--width looks at all points, --shard computes some", "give one of them");
+  }
   arguments.options.out_dir = arguments.out;
   int exit_code = 0;
   for (const std::string& given : arguments.files) {
@@ -600,10 +703,11 @@ int RunStudies(StudyArguments arguments) {
     StudyOutcome outcome;
     {
       StudyProgress progress(file);
-      arguments.options.points.progress = [&](std::uint64_t done, std::uint64_t all) {
-        progress.Report(done, all);
+      arguments.options.points.progress = [&](std::uint64_t done, std::uint64_t all, double cpu_s) {
+        progress.Report(done, all, cpu_s);
       };
-      outcome = RunStudy(file, arguments.options);
+      outcome = arguments.width ? RunStudyUntil(file, arguments.options, *arguments.width)
+                                : RunStudy(file, arguments.options);
     }
     exit_code = WorseExit(exit_code, PrintStudy(arguments, file, outcome));
   }
@@ -616,7 +720,8 @@ void AddStudyOptions(CLI::App* study, StudyArguments* arguments) {
   study->add_option("--jobs", arguments->options.points.jobs, "worker processes at once")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
-  study->add_flag("--resume", arguments->options.resume, "go on with what a killed study left");
+  study->add_flag("--resume", arguments->options.resume,
+                  "go on with what a killed study, or one of fewer points, left");
   study->add_option("--shard", arguments->shard, "i/n: every n-th point, to be merged later");
   study
       ->add_option("--timeout", arguments->options.points.timeout_s,
@@ -631,6 +736,10 @@ void AddStudyOptions(CLI::App* study, StudyArguments* arguments) {
       ->add_option("--seed", arguments->options.reading.drawn.seed,
                    "which points are drawn, instead of the file's seed")
       ->check(WholeNumber());
+  study
+      ->add_option("--width", arguments->width,
+                   "draw twice as many points each time until no interval of 95 % is wider")
+      ->check(Positive());
   study->add_flag("--yes", arguments->options.reading.many, "take more than 1e7 points");
   arguments->json.AddTo(study);
 }
@@ -646,8 +755,16 @@ void AddStudyCommand(CLI::App* app, int* exit_code) {
   CLI::App* merge = study->add_subcommand("merge", "Join the folders of all shards of a study");
   merge->add_option("folders", arguments->folders, "result folders of the shards")->required();
   merge->add_option("-o,--out", arguments->out, "folder for results")->capture_default_str();
+  merge->add_option("--sqlite", arguments->sqlite, "also write all rows to this new SQLite file");
   merge->callback([arguments, exit_code] {
-    *exit_code = PrintStudy(*arguments, "", MergeStudies(arguments->folders, arguments->out));
+    const StudyOutcome outcome = MergeStudies(arguments->folders, arguments->out);
+    *exit_code = PrintStudy(*arguments, "", outcome);
+    if (arguments->sqlite.empty() || !outcome.report) return;
+    const std::string trouble =
+        WriteSqlite(outcome.folder, outcome.report->study, arguments->sqlite);
+    if (trouble.empty()) return;
+    Say(stderr, "error: {}\n", trouble);
+    *exit_code = WorseExit(*exit_code, 3);
   });
   const char* codes = "0 limits are kept, 1 one is not, 2 bad input, 3 no point could run";
   SetFooter(merge, {"study merge out/s.shard-1-of-2 out/s.shard-2-of-2 -o out"}, codes);

@@ -16,7 +16,8 @@ namespace mbv {
 struct RunStudyOptions {
   std::string out_dir = "out";
   PointsOptions points;
-  bool resume = false;   ///< go on with what a killed study left
+  /// Go on with what a killed study left, or with the result of fewer points of the same study.
+  bool resume = false;
   StudyOptions reading;  ///< of the file
 };
 
@@ -30,6 +31,16 @@ struct StudyOutcome {
 /// Rows grow in OUT/NAME.part, which goes when the result is in OUT/NAME. A shard's result is in
 /// OUT/NAME.shard-2-of-5.
 [[nodiscard]] StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options);
+
+/// Draws 64 points or blocks, then twice as many each time, up to the design's number, until no
+/// interval of a share or of a Sobol' index is wider than `width`.
+[[nodiscard]] StudyOutcome RunStudyUntil(const std::string& file, RunStudyOptions options,
+                                         double width);
+
+/// The rows of a result folder as one SQLite file: the table `points`, a column for each of
+/// points.csv. "" or why not.
+[[nodiscard]] std::string WriteSqlite(const std::filesystem::path& folder, const Study& study,
+                                      const std::string& file);
 
 /// Joins the folders of all shards of one study: the same bytes as those of the study at once.
 [[nodiscard]] StudyOutcome MergeStudies(const std::vector<std::string>& folders,
@@ -58,7 +69,8 @@ struct StudyIdentity {
   std::string study, file, fingerprint;
   DrawnDesign drawn;
   StudyShare share;
-  std::string points;  ///< fingerprint of the finished points and forces; "" while they grow
+  std::string points = {};  ///< fingerprint of the finished points and forces; "" while they grow
+  std::uint64_t size = 0;   ///< Design::count
 };
 inline constexpr const char* kStudyFile = "study.json";
 
@@ -78,8 +90,9 @@ class StudyFolder {
   StudyFolder& operator=(const StudyFolder&) = delete;
 
   /// Makes it, or takes what a killed study left: only with `resume`, and of the same study. Empty,
-  /// or why not.
-  [[nodiscard]] std::optional<Finding> Open(bool resume);
+  /// or why not. `bench`: whose rows with fewer drawn points are taken, too, where its design
+  /// grows.
+  [[nodiscard]] std::optional<Finding> Open(bool resume, const StudyBench* bench = nullptr);
   /// Publishes points and forces with these files in OUT/NAME; then the folder goes. "" or why not.
   [[nodiscard]] std::string Publish(const std::vector<std::pair<std::string, std::string>>& files);
 
@@ -87,6 +100,8 @@ class StudyFolder {
   [[nodiscard]] const std::filesystem::path& target() const { return target_; }
 
  private:
+  [[nodiscard]] bool TakeFewer(const StudyBench& bench);
+
   std::filesystem::path out_, target_, path_;
   StudyIdentity identity_;
   std::string name_;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <ctime>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -130,13 +132,14 @@ const Trace* FirstTrace(const Attempt& attempt) {
              : nullptr;
 }
 
-// Count and seed may differ from the file's.
-std::string FingerprintOf(const std::vector<InputFile>& files, const Design& design) {
-  Fingerprint fingerprint;
-  fingerprint.Add(fmt::format("{} {}", design.count, design.seed));
-  for (const InputFile& file : files) fingerprint.Add(file.fingerprint);
-  for (const auto& [name, version] : Versions()) fingerprint.Add(name + " " + version);
-  return fingerprint.Text();
+// The reference alone needs no closed form: it is then not made for each point, where nothing in
+// the scenario refers to it.
+bool NeedsNoClosedForm(const Study& study, const Prepared& prepared) {
+  return study.witnesses == std::vector<std::string>{role::kReference.name} &&
+         prepared.scenario.reference.on && prepared.scenario.figures.empty() &&
+         std::ranges::none_of(study.factors, [](const Factor& factor) {
+           return factor.key.starts_with("analytic");
+         });
 }
 
 Finding FindingAt(const Study& study, int line, int column, std::string message, std::string hint) {
@@ -189,7 +192,7 @@ std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* di
   bench->Measure(*attempt.prepared, attempt.run, diagnostics);
   if (diagnostics->has_errors()) return nullptr;
   bench->nominal_.forces = ForceSamples(bench->forces_, FirstTrace(attempt));
-  bench->fingerprint_ = FingerprintOf(watch.files(), study.design);
+  bench->without_closed_form_ = NeedsNoClosedForm(study, *attempt.prepared);
   bench->inputs_ = watch.files();
   *exit_code = 0;
   return bench;
@@ -311,12 +314,28 @@ void StudyBench::FindIdle(double timeout_s, Diagnostics* diagnostics) {
   }
 }
 
+// Without what no witness of the study reads.
+std::vector<SetValue> StudyBench::SetsOfPoint(const std::vector<double>& varied) const {
+  std::vector<SetValue> sets = SetsOf(varied);
+  if (without_closed_form_) sets.emplace_back("analytic", "off");
+  return sets;
+}
+
+// Count and seed may differ from the file's.
+std::string StudyBench::FingerprintOf(std::uint64_t count) const {
+  Fingerprint fingerprint;
+  fingerprint.Add(fmt::format("{} {}", count, study_.design.seed));
+  for (const InputFile& file : inputs_) fingerprint.Add(file.fingerprint);
+  for (const auto& [name, version] : Versions()) fingerprint.Add(name + " " + version);
+  return fingerprint.Text();
+}
+
 StudyPoint StudyBench::Run(std::uint64_t number) const {
   StudyPoint point;
   point.row.point = number;
   point.row.varied = points_.At(number);
   Attempt attempt;
-  Try(study_, SetsOf(point.row.varied), &memory_, &attempt, &point.row);
+  Try(study_, SetsOfPoint(point.row.varied), &memory_, &attempt, &point.row);
   point.forces = ForceSamples(forces_, FirstTrace(attempt));
   return point;
 }
@@ -346,6 +365,12 @@ namespace fs = std::filesystem;
 std::string BytesOfForces(const StudyPoint& point) {
   if (point.row.point >= kBandPoints) return "";
   return {reinterpret_cast<const char*>(point.forces.data()), point.forces.size() * sizeof(float)};
+}
+
+double ProcessorTime() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 // Once more, alone: what killed the child may have been none of the point's doing.
@@ -392,18 +417,25 @@ std::string ComputePoints(const StudyBench& bench, const PointsOptions& options,
   if (!trouble.empty()) return trouble;
   const std::uint64_t all = options.share.size(bench.points().count());
   const auto number = [&](size_t i) { return options.share.number(done.rows + i); };
-  const auto work = [&](size_t i) {  // in a child
+  const auto work = [&](size_t i) {  // in a child; its time comes first
+    const double start_s = ProcessorTime();
     const StudyPoint point = bench.Run(number(i));
-    return PointLine(point.row, bench.study()) + BytesOfForces(point);
+    const double cpu_s = ProcessorTime() - start_s;
+    return std::string(reinterpret_cast<const char*>(&cpu_s), sizeof cpu_s) +
+           PointLine(point.row, bench.study()) + BytesOfForces(point);
   };
   const std::string lost =
       fmt::format("ended by a crash, or not finished after {:g} s", options.timeout_s);
+  double cpu_s = 0.0;
   const auto take = [&](size_t i, std::optional<std::string> text) {
     std::string line, bytes;
     if (!text) text = Again(work, i, options.timeout_s);
     if (text) {
-      const size_t end = text->find('\n') + 1;
-      line = text->substr(0, end);
+      double of_point_s = 0.0;
+      std::memcpy(&of_point_s, text->data(), sizeof of_point_s);
+      cpu_s += of_point_s;
+      const size_t end = text->find('\n', sizeof of_point_s) + 1;
+      line = text->substr(sizeof of_point_s, end - sizeof of_point_s);
       bytes = text->substr(end);
     } else {
       const StudyPoint point = bench.Lost(number(i), lost);
@@ -412,7 +444,8 @@ std::string ComputePoints(const StudyBench& bench, const PointsOptions& options,
     }
     trouble = forces.Append(bytes);  // first: a row has its forces
     if (trouble.empty()) trouble = csv.Append(line);
-    if (options.progress) options.progress(done.rows + i + 1, all);
+    if (options.progress)
+      options.progress(done.rows + i + 1, all, cpu_s / static_cast<double>(i + 1));
     return trouble.empty();
   };
   StreamFromChildren(all - done.rows, {.parallel = options.jobs, .timeout_s = options.timeout_s},

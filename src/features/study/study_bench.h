@@ -61,7 +61,9 @@ class StudyBench {
   /// The files that it is computed from.
   [[nodiscard]] const std::vector<InputFile>& inputs() const { return inputs_; }
   /// Distinguishes a study, its scenario and model, and this program from others.
-  [[nodiscard]] const std::string& fingerprint() const { return fingerprint_; }
+  [[nodiscard]] std::string fingerprint() const { return FingerprintOf(study_.design.count); }
+  /// That of the same study with another number of drawn points.
+  [[nodiscard]] std::string FingerprintOf(std::uint64_t count) const;
 
   /// A function of the study and the number alone.
   [[nodiscard]] StudyPoint Run(std::uint64_t number) const;
@@ -78,6 +80,7 @@ class StudyBench {
  private:
   explicit StudyBench(Study study) : study_(std::move(study)), points_(study_.Points()) {}
   [[nodiscard]] std::vector<SetValue> SetsOf(const std::vector<double>& varied) const;
+  [[nodiscard]] std::vector<SetValue> SetsOfPoint(const std::vector<double>& varied) const;
   [[nodiscard]] std::string MovedBy(size_t factor) const;
   void CheckKeys(Diagnostics* diagnostics) const;
   void Measure(const Prepared& prepared, const StudyRun& run, Diagnostics* diagnostics);
@@ -89,10 +92,9 @@ class StudyBench {
   StudyPoint nominal_;
   StudyForces forces_;
   MeasuredForces measured_;
-  bool steps_ = false;
+  bool steps_ = false, without_closed_form_ = false;
   std::vector<std::string> idle_;
   std::vector<InputFile> inputs_;
-  std::string fingerprint_;
 };
 
 // The rows of a study, computed in worker processes and appended to files as they come.
@@ -121,7 +123,8 @@ struct PointsOptions {
   StudyShare share;
   int jobs = 1;
   double timeout_s = 300.0;  ///< of one point
-  std::function<void(std::uint64_t done, std::uint64_t all)> progress = {};
+  /// `cpu_s`: processor time of a point, the mean of those computed now.
+  std::function<void(std::uint64_t done, std::uint64_t all, double cpu_s)> progress = {};
 };
 
 /// How much of an earlier computation is good.

@@ -339,6 +339,22 @@ bool StudySummary::within_limits() const {
          std::all_of(limits.begin(), limits.end(), [](const LimitResult& l) { return l.pass(); });
 }
 
+double WidestInterval(const StudySummary& summary) {
+  double widest = kNan;
+  const auto take = [&](const Interval& interval) {
+    widest = std::fmax(widest, interval.upper - interval.lower);
+  };
+  for (const LimitResult& limit : summary.limits) take(limit.interval);
+  for (const QuantitySummary& quantity : summary.quantities) {
+    if (!quantity.sobol) continue;
+    for (const SobolIndex& index : quantity.sobol->indices) {
+      take(index.first_interval);
+      take(index.total_interval);
+    }
+  }
+  return widest;
+}
+
 StudySummary SummariseStudy(const Study& study, const std::vector<double>& nominal,
                             const PointRows& rows) {
   StudySummary summary;

@@ -137,6 +137,9 @@ struct StudySummary {
 };
 inline constexpr size_t kReasons = 20;  ///< others count under "…"
 
+/// The widest interval of all shares and Sobol' indices; NaN where there is none.
+[[nodiscard]] double WidestInterval(const StudySummary& summary);
+
 /// Takes 8 bytes per point, for one quantity after the other. `nominal`: per quantity.
 [[nodiscard]] StudySummary SummariseStudy(const Study& study, const std::vector<double>& nominal,
                                           const PointRows& rows);

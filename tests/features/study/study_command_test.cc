@@ -8,6 +8,8 @@
 #include <regex>
 #include <set>
 
+#include "features/regress/database.h"
+#include "features/study/study.h"
 #include "tests/features/study/study_fixture.h"
 
 namespace mbv {
@@ -30,8 +32,20 @@ TEST_F(StudyCommand, RowsAreTheSameForAnyNumberOfJobsAndShards) {
     folders += " " + File(std::string("parts/s.shard-") + shard + "-of-3");
   }
   EXPECT_FALSE(fs::exists(File("parts/s.shard-1-of-3/summary.json")));
-  const ProgramResult merged = mbverify("study merge" + folders + " -o " + File("merged"));
+  const std::string merge = "study merge" + folders + " -o " + File("merged") + " --sqlite ";
+  const ProgramResult merged = mbverify(merge + File("all.sqlite"));
   ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  Database database(File("all.sqlite"), Database::Mode::kRead);
+  Statement all(&database, "SELECT count(*), sum(exit) FROM points");
+  ASSERT_TRUE(all.Step()) << database.trouble();
+  EXPECT_EQ(all.Integer(0), 16);
+  EXPECT_EQ(all.Integer(1), 0);
+  Statement of_five(&database, "SELECT m, \"x.force.mean\" FROM points WHERE point = 5");
+  ASSERT_TRUE(of_five.Step()) << database.trouble();
+  const std::string row = fmt::format("\n5,1,0,,{:.17g},", of_five.Real(0));
+  EXPECT_NE(rows.find(row), std::string::npos) << row;
+  EXPECT_NE(rows.find(fmt::format(",{:.17g},", of_five.Real(1))), std::string::npos);
+  EXPECT_EQ(mbverify(merge + File("all.sqlite")).exit_code, 3);  // nothing is replaced
   for (const char* name : {"points.csv", "forces.bin", "summary.json", "report.html"}) {
     EXPECT_EQ(ReadAll(File(std::string("merged/s/") + name)),
               ReadAll(File(std::string("one/s/") + name)))
@@ -353,6 +367,58 @@ TEST_F(StudyCommand, ADamagedIdentityIsAFindingWithItsKey) {
   refused(text.substr(0, text.size() / 2), "the file ends before its JSON does");
   refused("", "the file is empty");
   refused(std::string(200000, '['), "the JSON is nested more than 100 levels deep");
+}
+
+// What an earlier result of fewer points has stays, and the rest follows it.
+TEST_F(StudyCommand, MorePointsKeepThoseThatAreThere) {
+  for (const char* design : {"{sobol: 8}", "{saltelli: 8}"}) {
+    const std::string out = design[1] == 's' && design[2] == 'o' ? "sobol" : "saltelli";
+    WriteStudy(design);
+    ASSERT_EQ(Study(out).exit_code, 0);
+    const std::string few = Points(out);
+    ASSERT_EQ(Study(out + "_anew", "--count 32").exit_code, 0);
+    const ProgramResult more = Study(out, "--count 32 --resume --jobs 2");
+    ASSERT_EQ(more.exit_code, 0) << more.err;
+    EXPECT_TRUE(Points(out).starts_with(few)) << out;
+    EXPECT_EQ(Points(out), Points(out + "_anew")) << out;
+    EXPECT_EQ(Summary(out), Summary(out + "_anew")) << out;
+    EXPECT_EQ(ReadAll(File(out + "/s/forces.bin")), ReadAll(File(out + "_anew/s/forces.bin")));
+  }
+}
+
+// They are taken, not computed again: only where their fingerprint is that of the study.
+TEST_F(StudyCommand, MorePointsTakeNoRowThatWasTouched) {
+  WriteStudy("{sobol: 8}");
+  for (const bool signed_anew : {false, true}) {
+    const std::string out = signed_anew ? "taken" : "refused";
+    ASSERT_EQ(Study(out).exit_code, 0);
+    const std::string good = Points(out);
+    std::string touched = good;
+    touched[touched.size() - 2] = touched[touched.size() - 2] == '1' ? '2' : '1';
+    Write(out + "/s/points.csv", touched);
+    auto identity = nlohmann::json::parse(ReadAll(File(out + "/s/study.json")));
+    if (signed_anew) identity["points"] = PointsFingerprint(File(out + "/s"));
+    Write(out + "/s/study.json", identity.dump());
+    ASSERT_EQ(Study(out, "--count 16 --resume").exit_code, 0);
+    EXPECT_TRUE(Points(out).starts_with(signed_anew ? touched : good)) << out;
+  }
+}
+
+// The interval of a share of one half, of n points, is about 4 √(0.25 / n) = 2 / √n wide.
+TEST_F(StudyCommand, PointsAreDrawnUntilTheIntervalIsNarrow) {
+  WriteStudy("{sobol: 4096}", "limits: {x.force.mean: {below: 20, share: 0.9}}\n");
+  const ProgramResult result = Study("out", "--width 0.2");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = Summary("out");
+  EXPECT_EQ(json["points"], 128);
+  const auto interval = json["limits"][0]["interval"];
+  EXPECT_LT(interval[1].get<double>() - interval[0].get<double>(), 0.2);
+  ASSERT_EQ(Study("alone", "--count 128").exit_code, 0);
+  EXPECT_EQ(Points("out"), Points("alone"));
+  WriteStudy("{sobol: 4096}");
+  EXPECT_EQ(Study("none", "--width 0.2").exit_code, 2);
+  WriteStudy("{latin_hypercube: 100}");
+  EXPECT_EQ(Study("none", "--width 0.2").exit_code, 2);
 }
 
 }  // namespace
