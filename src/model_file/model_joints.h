@@ -54,7 +54,7 @@ class JointReader {
   ModelJoints& joints_;
 };
 
-/// The choice that a `kind` makes; what people also look for there, and models cannot express, is a
+/// The choice that a `kind` makes; what is also looked for there, and models cannot express, is a
 /// finding that says so.
 [[nodiscard]] std::optional<int> ReadKind(const YamlNode& kind, const std::string& path,
                                           const std::vector<std::string>& words, YamlReader* yaml);
