@@ -54,8 +54,8 @@ class JointReader {
   ModelJoints& joints_;
 };
 
-/// The choice that a `kind` makes; a kind that is often wanted there, and that models cannot
-/// express, is a finding that says so.
+/// The choice that a `kind` makes; what is also looked for there, and models cannot express, is a
+/// finding that says so.
 [[nodiscard]] std::optional<int> ReadKind(const YamlNode& kind, const std::string& path,
                                           const std::vector<std::string>& words, YamlReader* yaml);
 

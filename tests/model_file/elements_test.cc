@@ -99,7 +99,7 @@ TEST(Elements, OfPartsNameTheirOwnJointsAndDrives) {
 TEST(Elements, WhatMeansNothingIsAFinding) {
   EXPECT_EQ(ElementFindings("  g: {kind: dumping, joint: turn, damping: 2}\n"),
             "m.yaml:10:13: error: elements.g.kind = 'dumping' is not one of: damping, spring, "
-            "rotor, friction, stop, curve, bushing\n  hint: did you mean 'damping'?\n");
+            "rotor, friction, stop, curve, expression, bushing\n  hint: did you mean 'damping'?\n");
   EXPECT_EQ(ElementFindings("  g: {kind: damping, joint: tern, damping: 2}\n"),
             "m.yaml:10:29: error: elements.g.joint = 'tern': there is no such joint\n"
             "  hint: did you mean 'turn'?\n");

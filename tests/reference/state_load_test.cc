@@ -158,7 +158,7 @@ TEST(StateForces, MoveAFreeBarAsTheSpringAndTheDamperDo) {
                        ColumnOf(driven.trace, "energy.gravity") -
                        ColumnOf(driven.trace, "motor.work");
   EXPECT_LT((balance.array() - balance[0]).abs().maxCoeff(), 1e-11);
-  motion.forces[0].following = NotFiniteBeyond(0.3, true).following[0].function;
+  motion.forces[0].following = NotFiniteBeyond(0.105, true).following[0].function;
   const ForwardRun ended = RunForwardReference(plain, motion);
   EXPECT_EQ(ended.summary.where, "forces.motor");
   EXPECT_NE(ended.summary.message.find("pivot.position = "), std::string::npos);
