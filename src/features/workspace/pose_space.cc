@@ -557,10 +557,9 @@ double ShareToLookAt(const std::vector<MarginsAt>& known, Eigen::Index j) {
   for (size_t k = 0; k + 2 < known.size(); ++k) {
     const double t0 = known[k].share, t1 = known[k + 1].share, t2 = known[k + 2].share;
     const double f0 = known[k].margin[j], f1 = known[k + 1].margin[j], f2 = known[k + 2].margin[j];
-    const double slope = (f1 - f0) / (t1 - t0),
-                 curvature = ((f2 - f1) / (t2 - t1) - slope) / (t2 - t0);
-    const auto parabola = [&](double t) { return f0 + (t - t0) * (slope + curvature * (t - t1)); };
-    const double vertex = 0.5 * (t0 + t1 - slope / curvature);
+    const double slope = (f1 - f0) / (t1 - t0), quad = ((f2 - f1) / (t2 - t1) - slope) / (t2 - t0);
+    const auto parabola = [&](double t) { return f0 + (t - t0) * (slope + quad * (t - t1)); };
+    const double vertex = 0.5 * (t0 + t1 - slope / quad);
     // Next to an end, or about a least margin, poses so far away that theirs are many times as
     // large do not show it.
     const double least = kNearZero * std::max(f0, f2);
@@ -572,7 +571,7 @@ double ShareToLookAt(const std::vector<MarginsAt>& known, Eigen::Index j) {
       t = std::abs(vertex - t1) > std::abs(away) ? vertex : t1 + away;
     }
     if (std::isfinite(t) && is_new(t)) return t;
-    if (curvature > 0.0 && vertex > t0 && vertex < t2 && is_new(vertex) &&
+    if (quad > 0.0 && vertex > t0 && vertex < t2 && is_new(vertex) &&
         parabola(vertex) < kNearZero * std::min({f0, f1, f2})) {
       return vertex;
     }
@@ -580,7 +579,7 @@ double ShareToLookAt(const std::vector<MarginsAt>& known, Eigen::Index j) {
     // Newton's cubic less its parabola is what this may be off, at quarters of all three parts.
     const double t3 = known[k + 3].share, f3 = known[k + 3].margin[j];
     const double third =
-        (((f3 - f2) / (t3 - t2) - (f2 - f1) / (t2 - t1)) / (t3 - t1) - curvature) / (t3 - t0);
+        (((f3 - f2) / (t3 - t2) - (f2 - f1) / (t2 - t1)) / (t3 - t1) - quad) / (t3 - t0);
     for (size_t part = k; part < k + 3; ++part) {
       for (const double quarter : {0.25, 0.5, 0.75}) {
         const double from = known[part].share;

@@ -636,10 +636,10 @@ TEST(ReachableSet, AWayLeavesTheSetWhereItsLeastMarginVanishes) {
   const auto bound = static_cast<Eigen::Index>(space.bounds().size()) - 1;
   ASSERT_NE(space.bounds().back().kind, SetBound::Kind::kConstraint);
   std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> share(0.02, 0.98), factor(-0.9, 0.9), power(-4.0, 1.0);
+  std::uniform_real_distribution<double> share(0.02, 0.98), quad(-0.9, 0.9), power(-4.0, 1.0);
   int found = 0;
   for (int i = 0; i < 3000; ++i) {
-    const double r = share(random), b = factor(random), d = factor(random);
+    const double r = share(random), b = quad(random), d = quad(random);
     const double scale = std::pow(10.0, power(random));
     for (const double c : {0.0, -1e-6, 1e-6}) {
       const auto margins = [&](double t) {
