@@ -283,7 +283,7 @@ const std::vector<Writer>& Writers() {
          return SvgFigure(1, 1, t, SvgText({{"x", 1.0}, {"class", t}}, t));
        }},
       {"regress", Format::kHtml,
-       [](const std::string& t) { return ToIndexHtml(RegressionOf(t), {}); }},
+       [](const std::string& t) { return ToIndexPages(RegressionOf(t), {}).front(); }},
       {"crosscheck", Format::kHtml, [](const std::string& t) { return ToHtml(EnginesOf(t)); }},
       {"stiffness", Format::kHtml,
        [](const std::string& t) {
