@@ -15,9 +15,6 @@ namespace {
 
 // A pivot may be this much smaller than the largest entry of its column.
 constexpr double kPivotTolerance = 0.1;
-// In an order that was given, a pivot of the diagonal may be smaller: by what the weight of
-// SparseLeastNorm is, and some.
-constexpr double kDiagonalTolerance = 0.01;
 // Pivots chosen for another matrix serve while none is smaller by this than it was there: with 1e-3
 // the inverse dynamics of a SCARA robot's pick and place loses two digits.
 constexpr double kSmaller = 0.1;
@@ -48,13 +45,12 @@ struct Analysis {
   Analysis(const Analysis&) = delete;
   Analysis& operator=(const Analysis&) = delete;
 
-  [[nodiscard]] bool IsOf(std::span<const int> other_columns, std::span<const int> other_rows,
-                          const std::vector<int>& other_order) const {
-    return std::ranges::equal(columns, other_columns) && std::ranges::equal(rows, other_rows) &&
-           order == other_order;
+  [[nodiscard]] bool IsOf(std::span<const int> other_columns,
+                          std::span<const int> other_rows) const {
+    return std::ranges::equal(columns, other_columns) && std::ranges::equal(rows, other_rows);
   }
 
-  std::vector<int> columns, rows, order;
+  std::vector<int> columns, rows;
   klu_symbolic* symbolic = nullptr;
 };
 
@@ -79,22 +75,16 @@ struct SparseLu::Factors {
   void Analyse(int* columns, int* rows) {
     thread_local std::array<std::shared_ptr<Analysis>, 4> known;
     thread_local size_t next = 0;
-    const bool given = !order.empty();
-    common.tol = given ? kDiagonalTolerance : kPivotTolerance;
-    common.btf = given ? 0 : 1;
     const std::span<const int> starts(columns, static_cast<size_t>(n) + 1);
     const std::span<const int> places(rows, static_cast<size_t>(columns[n]));
     for (const auto& one : known) {
-      if (one != nullptr && one->IsOf(starts, places, order)) analysis = one;
+      if (one != nullptr && one->IsOf(starts, places)) analysis = one;
     }
     if (analysis == nullptr) {
       analysis = std::make_shared<Analysis>();
       analysis->columns.assign(starts.begin(), starts.end());
       analysis->rows.assign(places.begin(), places.end());
-      analysis->order = order;
-      analysis->symbolic =
-          given ? klu_analyze_given(n, columns, rows, order.data(), order.data(), &common)
-                : klu_analyze(n, columns, rows, &common);
+      analysis->symbolic = klu_analyze(n, columns, rows, &common);
       known[next++ % known.size()] = analysis;
     }
     symbolic = analysis->symbolic;
@@ -127,9 +117,8 @@ struct SparseLu::Factors {
   std::shared_ptr<Analysis> analysis;
   klu_symbolic* symbolic = nullptr;  // of it
   klu_numeric* numeric = nullptr;
-  int n = 0, sign = 1;     // sign: of both permutations
-  std::vector<int> order;  // given; of rows and columns
-  VecX chosen;             // sizes of the pivots when they were chosen
+  int n = 0, sign = 1;  // sign: of both permutations
+  VecX chosen;          // sizes of the pivots when they were chosen
   std::vector<char> seen;
 };
 
@@ -138,10 +127,7 @@ SparseLu::~SparseLu() = default;
 SparseLu::SparseLu(SparseLu&&) noexcept = default;
 SparseLu& SparseLu::operator=(SparseLu&&) noexcept = default;
 
-void SparseLu::Reset(std::vector<int> order) {
-  factors_->Clear();
-  factors_->order = std::move(order);
-}
+void SparseLu::Reset() { factors_->Clear(); }
 
 bool SparseLu::Factor(const Matrix& A) {
   MBV_DEMAND(A.rows() == A.cols() && A.isCompressed(), A.rows());
@@ -152,7 +138,6 @@ bool SparseLu::Factor(const Matrix& A) {
   if (f.symbolic == nullptr) {
     f.n = static_cast<int>(A.cols());
     if (f.n == 0) return true;
-    MBV_DEMAND(f.order.empty() || static_cast<int>(f.order.size()) == f.n, f.order.size());
     f.Analyse(columns, rows);
     if (f.symbolic == nullptr) return false;
   }
@@ -375,35 +360,6 @@ int PlaceOf(const SparseLu::Matrix& matrix, Eigen::Index row, Eigen::Index colum
   return static_cast<int>(std::lower_bound(first, last, row) - matrix.innerIndexPtr());
 }
 
-// Squares that are a smaller share of the largest pivot may be round-off of it.
-constexpr double kSquaresEnd = 64 * kEps;
-
-// Order of elimination of [D −Bᵀ; B 0] with diagonal D, where no pivot off the diagonal is needed:
-// multipliers in one that keeps factors of B Bᵀ sparse, each unknown before the first of its own.
-// Of nets of loops the factors have a fifth of COLAMD's entries.
-std::vector<int> SaddleOrder(SparseLu::Matrix B_transposed) {
-  const auto n = static_cast<int>(B_transposed.rows());
-  std::ranges::fill(B_transposed.coeffs(), 1.0);
-  const SparseLu::Matrix pattern = SparseLu::Matrix(B_transposed.transpose()) * B_transposed;
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
-  if (pattern.cols() > 0) Eigen::AMDOrdering<int>()(pattern, permutation);
-  std::vector<int> order;
-  std::vector<char> has(static_cast<size_t>(n), 0);
-  for (Eigen::Index k = 0; k < pattern.cols(); ++k) {
-    const int multiplier = permutation.indices()[k];
-    for (SparseLu::Matrix::InnerIterator entry(B_transposed, multiplier); entry; ++entry) {
-      if (std::exchange(has[static_cast<size_t>(entry.row())], 1) == 0) {
-        order.push_back(static_cast<int>(entry.row()));
-      }
-    }
-    order.push_back(n + multiplier);
-  }
-  for (int i = 0; i < n; ++i) {
-    if (has[static_cast<size_t>(i)] == 0) order.push_back(i);
-  }
-  return order;
-}
-
 template <typename Visit>
 void ForEntries(const SparseLu::Matrix& matrix, const Visit& visit) {
   for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
@@ -437,8 +393,6 @@ void SparseSaddle::MakePattern(const Matrix& W, const Matrix& B_transposed) {
     in_columns_.push_back(PlaceOf(K_, n + c, r));
     in_rows_.push_back(PlaceOf(K_, r, n + c));
   });
-  const bool diagonal = W.nonZeros() == n;
-  lu_.Reset(diagonal ? SaddleOrder(B_transposed) : std::vector<int>());
 }
 
 bool SparseSaddle::Factor(const Matrix& W, const Matrix& B_transposed, double tolerance) {
@@ -449,10 +403,7 @@ bool SparseSaddle::Factor(const Matrix& W, const Matrix& B_transposed, double to
     values[in_columns_[k]] = B_transposed.valuePtr()[k];
     values[in_rows_[k]] = -B_transposed.valuePtr()[k];
   }
-  // Where unknowns go first, pivots of multipliers are those of B Bᵀ: squares.
-  const bool squares = W.nonZeros() == W.cols();
-  return lu_.Factor(K_) &&
-         lu_.PivotRatio() > (squares ? std::max(tolerance * tolerance, kSquaresEnd) : tolerance);
+  return lu_.Factor(K_) && lu_.PivotRatio() > tolerance;
 }
 
 void SparseSaddle::Solve(const VecX& c, const VecX& b, VecX* x, VecX* y, int refinements) const {

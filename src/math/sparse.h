@@ -22,10 +22,8 @@ class SparseLu {
   SparseLu(SparseLu&&) noexcept;
   SparseLu& operator=(SparseLu&&) noexcept;
 
-  /// Forgets the pattern; the next Factor() takes that of its matrix. `order`: of elimination of
-  /// rows and columns alike, with pivots on the diagonal where these are not too small; chosen by
-  /// COLAMD where it is empty.
-  void Reset(std::vector<int> order = {});
+  /// Forgets the pattern; the next Factor() takes that of its matrix.
+  void Reset();
   /// Factors A, of the pattern that the first call since Reset() had. False where A is singular as
   /// far as its pivots show (one is exactly zero), or not finite.
   [[nodiscard]] bool Factor(const Matrix& A);

@@ -353,7 +353,8 @@ class RangeTracer {
       PlacedPose from, to;
       VecX target = pose.at;
       for (size_t r = 0; r < count_; ++r) target[settings_.ranged[r].coordinate] = ValueOf(key, r);
-      if (own.Place(pose, &from) && own.CloseInside(from, target, &to)) {
+      if (own.Place(pose, &from) && own.Close(from, target, &to) &&
+          to.pose.margin.minCoeff() > 0.0) {
         seeds.push_back(std::move(to));
       }
     };

@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <iterator>
 #include <map>
-#include <optional>
 #include <set>
 #include <thread>
 #include <unordered_map>
@@ -27,9 +26,7 @@ constexpr double kCutShare = 1e-4;  // of an edge, to which a cut is found
 constexpr int kMostCuts = 30;
 constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]; of a plan
 constexpr int kMostStrides = 10000;
-constexpr int kFewStrides = 8, kMostShorter = 4;         // shorter ones where a set is small
 constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
-constexpr double kAtCrossing = 1e-9;  // the same, at a corner: it lies where branches cross
 constexpr double kGibibyte = 1073741824.0, kMostCorners = 4e6;
 constexpr double kOverhead = 200.0;   // bytes of a corner beside its pose: key, node, allocations
 constexpr size_t kKeptAtOnce = 1024;  // of corners or cuts that are kept at once
@@ -187,30 +184,6 @@ class Flooder {
     return space.Close(from, space.Target(x), at) ? Fibre::Reach::kWhole : Fibre::Reach::kNone;
   }
 
-  // Whether the set is left on the way to another pose of it. Not looked for where the margin is
-  // that over a range.
-  [[nodiscard]] std::optional<PoseSpace::Gap> GapTo(const PoseSpace& space, const PlacedPose& from,
-                                                    const VecX& x, const PlacedPose& to,
-                                                    bool inside) const {
-    if (fibre_.any() || !inside || from.pose.margin.minCoeff() < 0.0) return std::nullopt;
-    const VecX start = from.pose.at, way = space.Target(x) - start;
-    for (size_t b = 0; b < space.bounds().size(); ++b) {
-      const auto j = static_cast<Eigen::Index>(b);
-      if (IsSingularity(space.bounds()[b].kind) &&
-          to.pose.margin[j] < kAtCrossing * from.pose.margin[j]) {
-        return PoseSpace::Gap{1.0, false, to};
-      }
-    }
-    return space.FindGap(
-        [&](double share, PlacedPose* at) { return space.Close(from, start + share * way, at); },
-        from.pose.margin, to.pose.margin);
-  }
-  [[nodiscard]] static int LeastOf(const VecX& margin) {
-    Eigen::Index least = 0;
-    margin.minCoeff(&least);
-    return static_cast<int>(least);
-  }
-
   [[nodiscard]] Corner Visit(const PoseSpace& space, const PlacedPose& from,
                              const Lattice& key) const {
     Corner corner;
@@ -224,10 +197,7 @@ class Flooder {
     const bool part = reach == Fibre::Reach::kPart;
     corner.inside = !part && least >= 0.0;
     corner.passes = corner.inside || (space.settings().for_all && at_start >= 0.0);
-    if (const auto gap = GapTo(space, from, At(key), at, corner.inside)) {
-      corner.inside = corner.passes = false;
-      corner.bound = gap->at.pose.margin.size() > 0 ? LeastOf(gap->at.pose.margin) : -1;
-    } else if (!corner.inside) {
+    if (!corner.inside) {
       corner.bound = part && least >= 0.0 ? FoldBound(at.pose.margin) : static_cast<int>(worst);
     }
     corner.pose = std::move(at.pose);
@@ -339,18 +309,19 @@ class Flooder {
     return a;
   }
 
-  // Corners of cells that were not visited, from the nearest one inside of the same cell's parent
-  // without a gap between.
+  // Corners of cells that were not visited, from the nearest one inside of the same cell's parent.
   void Complete(int level, const std::vector<Lattice>& cells) {
     const int spacing = SpacingAt(level);
-    std::map<Lattice, std::vector<std::pair<long, Lattice>>> wanted;  // and from where
+    std::map<Lattice, Lattice> wanted;  // and from where
     for (const Lattice& cell : cells) {
       ForEachCorner([&](const Lattice& offset) {
         const Lattice key = Sum(cell, offset, spacing);
         if (corners_.contains(key) || wanted.contains(key)) return;
-        std::vector<std::pair<long, Lattice>> near;
+        const Lattice* best = nullptr;
+        long least = 0;
+        Lattice candidate{};
         // Corners of this cell, and of the one that it is a part of.
-        for (int wider = 1; wider <= 2 && near.empty(); ++wider) {
+        for (int wider = 1; wider <= 2 && best == nullptr; ++wider) {
           const int s = spacing * wider;
           Lattice base = cell;
           if (wider == 2) {
@@ -365,26 +336,20 @@ class Flooder {
               const long d = other.at(c) - key.at(c);
               distance += d * d;
             }
-            near.emplace_back(distance, other);
+            if (best != nullptr && distance >= least) return;
+            candidate = other;
+            best = &candidate;
+            least = distance;
           });
         }
-        std::ranges::stable_sort(near, {}, &std::pair<long, Lattice>::first);
-        if (!near.empty()) wanted.emplace(key, std::move(near));
+        if (best != nullptr) wanted.emplace(key, candidate);
       });
     }
-    const std::vector<std::pair<Lattice, std::vector<std::pair<long, Lattice>>>> list(
-        wanted.begin(), wanted.end());
+    const std::vector<std::pair<Lattice, Lattice>> list(wanted.begin(), wanted.end());
     auto found = ForAll<Corner>(list.size(), [&](size_t i, PoseSpace& own) {
-      Corner corner;
-      for (const auto& [distance, other] : list[i].second) {
-        PlacedPose from;
-        if (own.Place(corners_.find(other)->second.pose, &from)) {
-          corner = Visit(own, from, list[i].first);
-        }
-        const bool behind = corner.closes && !corner.passes && corner.pose.margin.minCoeff() >= 0.0;
-        if (!behind || fibre_.any()) break;
-      }
-      return corner;
+      PlacedPose from;
+      const bool placed = own.Place(corners_.find(list[i].second)->second.pose, &from);
+      return placed ? Visit(own, from, list[i].first) : Corner();
     });
     for (size_t i = 0; i < list.size(); ++i) Take(list[i].first, std::move(found[i]));
   }
@@ -523,17 +488,11 @@ class Flooder {
                           : space.CloseNear(from, space.Target(x), &at);
     };
     if (Close(space, from, b, &at, &unused) == Fibre::Reach::kWhole) {
-      margin_high = at.pose.margin;
-      if (margin_high.minCoeff() >= 0.0) {
-        const auto gap = GapTo(space, from, b, at, true);
-        if (!gap || !gap->open) {  // by another sheet, or where branches of a bound cross
-          cut.share = gap ? gap->share : 1.0;
-          if (gap && gap->at.pose.margin.size() > 0) cut.bound = LeastOf(gap->at.pose.margin);
-          return cut;
-        }
-        high = gap->share;
-        margin_high = gap->at.pose.margin;
+      if (at.pose.margin.minCoeff() >= 0.0) {  // outside by another sheet
+        cut.share = 1.0;
+        return cut;
       }
+      margin_high = at.pose.margin;
     }
     // A fold is approached in steps that close, towards where the square of its margin would
     // vanish, which is linear there.
@@ -795,38 +754,32 @@ FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodS
   long poses = 0;
   const Fibre fibre(space.settings());
   constexpr Fibre::Reach none = Fibre::Reach::kNone;
-  // Strides to a bound on one side.
-  const auto strides = [&](int c, double step) {
-    PlacedPose at = home;
-    int count = 0;
-    for (; count < kMostStrides; ++count, ++poses) {
-      VecX target = at.pose.at;
-      target[c] += step;
-      PlacedPose next;
-      double at_start = 0.0;
-      if (fibre.any()) {
-        if (fibre.At(space, at, target.head(k), &next, &at_start) == none) break;
-        const bool all = space.settings().for_all;
-        if ((all ? at_start : next.pose.margin.minCoeff()) < 0.0) break;
-      } else if (!space.CloseInside(at, target, &next)) {
-        break;
-      }
-      at = std::move(next);
-    }
-    return count;
-  };
   for (int c = 0; c < k; ++c) {
-    double step = kStride * space.UnitOf(c), reach = 0.0;
-    for (int i = 0; i < kMostShorter; ++i, step *= 0.25) {
-      const int back = strides(c, -step), on = strides(c, step);
-      if (std::max(back, on) == kMostStrides) {
+    double reach = 0.0;
+    for (const double sign : {-1.0, 1.0}) {
+      PlacedPose at = home;
+      const double step = kStride * space.UnitOf(c);
+      int count = 0;
+      for (; count < kMostStrides; ++count, ++poses) {
+        VecX target = at.pose.at;
+        target[c] += sign * step;
+        PlacedPose next;
+        double at_start = 0.0;
+        const bool closes = fibre.any()
+                                ? fibre.At(space, at, target.head(k), &next, &at_start) != none
+                                : space.Close(at, target, &next);
+        if (!closes) break;
+        const bool all = fibre.any() && space.settings().for_all;
+        if ((all ? at_start : next.pose.margin.minCoeff()) < 0.0) break;
+        at = std::move(next);
+      }
+      if (count == kMostStrides) {
         plan.summary.stop = Stop::kUnreachable;
         plan.summary.message = "the set has no end: no range, box or singularity bounds " +
                                space.settings().coordinates[static_cast<size_t>(c)].name;
         return plan;
       }
-      reach = step * (back + on + 1.0);
-      if (back + on >= kFewStrides) break;
+      reach += step * (count + 0.5);
     }
     plan.step.at(static_cast<size_t>(c)) = kRoom * reach / resolution;
     cells *= kRoom * resolution;

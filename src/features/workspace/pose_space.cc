@@ -25,12 +25,6 @@ constexpr double kTrusted = 0.5;     // a correction beyond this share of the st
 constexpr double kOverlap = 0.3;     // of the motions before and behind a step: det N₁ᵀ N₂
 constexpr double kSlopeStep = 1e-5;  // of difference quotients [rad, characteristic lengths]
 constexpr int kMostIterations = 14, kMostHalvings = 8;
-constexpr double kVanishes = 1e-9, kClosed = 1e-12;  // margins by those of a way's ends; roundings
-constexpr double kNearZero = 0.2;  // a parabola's least margin by that at its poses
-constexpr double kTwists = 2.0;    // of what a parabola may be off, which a margin has to exceed
-constexpr double kNarrower = 0.1;
-constexpr double kSameShare = 1e-7;  // of a way
-constexpr int kMostLooks = 60;       // for a way's least margin
 
 Eigen::RowVectorXd Projected(const ScalarRow& row, const MatX& J) {
   return row.J_parent.transpose() * J.middleRows<6>(6 * row.parent) +
@@ -538,108 +532,6 @@ bool PoseSpace::Close(const PlacedPose& from, const VecX& target, PlacedPose* to
   }
   *to = std::move(at);
   return true;
-}
-
-namespace {
-
-struct MarginsAt {
-  double share = kNan;  // of a way
-  VecX margin;
-};
-
-// Where on a way a margin may be 0, though it is not at these poses: NaN where interpolation
-// excludes it.
-double ShareToLookAt(const std::vector<MarginsAt>& known, Eigen::Index j) {
-  const auto is_new = [&](double t) {
-    return std::ranges::none_of(
-        known, [&](const MarginsAt& at) { return std::abs(at.share - t) < kSameShare; });
-  };
-  for (size_t k = 0; k + 2 < known.size(); ++k) {
-    const double t0 = known[k].share, t1 = known[k + 1].share, t2 = known[k + 2].share;
-    const double f0 = known[k].margin[j], f1 = known[k + 1].margin[j], f2 = known[k + 2].margin[j];
-    const double slope = (f1 - f0) / (t1 - t0), quad = ((f2 - f1) / (t2 - t1) - slope) / (t2 - t0);
-    const auto parabola = [&](double t) { return f0 + (t - t0) * (slope + quad * (t - t1)); };
-    const double vertex = 0.5 * (t0 + t1 - slope / quad);
-    // Next to an end, or about a least margin, poses so far away that theirs are many times as
-    // large do not show it.
-    const double least = kNearZero * std::max(f0, f2);
-    double t = kNan;
-    if (k == 0 && f0 < kNearZero * f1) t = t0 + kNarrower * (t1 - t0);
-    if (k + 3 == known.size() && f2 < kNearZero * f1) t = t2 - kNarrower * (t2 - t1);
-    if (f1 <= f0 && f1 <= f2 && f1 < least) {
-      const double away = kNarrower * (t2 - t0) * (t2 - t1 > t1 - t0 ? 1.0 : -1.0);
-      t = std::abs(vertex - t1) > std::abs(away) ? vertex : t1 + away;
-    }
-    if (std::isfinite(t) && is_new(t)) return t;
-    if (quad > 0.0 && vertex > t0 && vertex < t2 && is_new(vertex) &&
-        parabola(vertex) < kNearZero * std::min({f0, f1, f2})) {
-      return vertex;
-    }
-    if (k + 3 >= known.size()) continue;
-    // Newton's cubic less its parabola is what this may be off, at quarters of all three parts.
-    const double t3 = known[k + 3].share, f3 = known[k + 3].margin[j];
-    const double third =
-        (((f3 - f2) / (t3 - t2) - (f2 - f1) / (t2 - t1)) / (t3 - t1) - quad) / (t3 - t0);
-    for (size_t part = k; part < k + 3; ++part) {
-      for (const double quarter : {0.25, 0.5, 0.75}) {
-        const double from = known[part].share;
-        const double at = from + quarter * (known[part + 1].share - from);
-        const double f = parabola(at), more = third * (at - t0) * (at - t1) * (at - t2);
-        if (std::min(f, f + more) < kTwists * std::abs(more) && is_new(at)) return at;
-      }
-    }
-  }
-  return kNan;
-}
-
-}  // namespace
-
-std::optional<PoseSpace::Gap> PoseSpace::FindGap(const Way& way, const VecX& margin_start,
-                                                 const VecX& margin_end) const {
-  const VecX none = (kVanishes * margin_start.cwiseMax(margin_end)).array() + kClosed;
-  std::vector<Eigen::Index> smooth;  // those that are not along a bound, or from one
-  for (Eigen::Index j = 0; j < none.size(); ++j) {
-    // The least pivot has kinks, and is nowhere negative.
-    const bool kinks = bounds_[static_cast<size_t>(j)].kind == SetBound::Kind::kConstraint;
-    if (!kinks && std::min(margin_start[j], margin_end[j]) >= none[j]) smooth.push_back(j);
-  }
-  std::vector<MarginsAt> known = {{0.0, margin_start}, {1.0, margin_end}};
-  Gap gap;
-  // Whether the set goes on at a share of the way.
-  const auto look = [&](double share) {
-    gap = Gap();
-    gap.share = share;
-    if (!way(share, &gap.at)) return false;
-    const VecX& margin = gap.at.pose.margin;
-    gap.open = (margin + none).minCoeff() < 0.0;
-    if (gap.open ||
-        std::ranges::any_of(smooth, [&](Eigen::Index j) { return margin[j] < none[j]; })) {
-      return false;
-    }
-    known.insert(std::ranges::upper_bound(known, share, {}, &MarginsAt::share), {share, margin});
-    return true;
-  };
-  for (const double share : {0.5, 0.25, 0.75}) {
-    if (!look(share)) return gap;
-  }
-  for (int i = 0; i < kMostLooks; ++i) {
-    double share = kNan;
-    for (const Eigen::Index j : smooth) {
-      share = ShareToLookAt(known, j);
-      if (std::isfinite(share)) break;
-    }
-    if (!std::isfinite(share)) return std::nullopt;
-    if (!look(share)) return gap;
-  }
-  return gap;  // it stays near zero
-}
-
-bool PoseSpace::CloseInside(const PlacedPose& from, const VecX& target, PlacedPose* to) const {
-  if (!Close(from, target, to) || to->pose.margin.minCoeff() <= 0.0) return false;
-  const VecX start = from.pose.at;
-  return !FindGap([&](double share,
-                      PlacedPose* at) { return Close(from, start + share * (target - start), at); },
-                  from.pose.margin, to->pose.margin);
 }
 
 VecX PoseSpace::Slope(const PlacedPose& at, int bound) const {

@@ -13,9 +13,7 @@
 // Neither way to a set of poses (flood.h, trace.h) uses more of the other than this file.
 #pragma once
 
-#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -174,20 +172,6 @@ class PoseSpace {
   [[nodiscard]] bool CloseNear(const PlacedPose& from, const VecX& target, PlacedPose* to) const {
     return CloseOnce(from, target, to) && to->type1 > 0.0;
   }
-  /// Where a way between two poses inside leaves the set, though: the first pose that is seen to be
-  /// outside, or the share of the way at which a margin vanishes and grows again.
-  struct Gap {
-    double share = kNan;
-    bool open = false;  ///< `at` is outside
-    PlacedPose at;
-  };
-  using Way = std::function<bool(double share, PlacedPose* at)>;
-  /// By margins at quarters of the way, and on to the least one where interpolation comes near
-  /// zero.
-  [[nodiscard]] std::optional<Gap> FindGap(const Way& way, const VecX& margin_start,
-                                           const VecX& margin_end) const;
-  /// Close() to a pose inside, with poses inside all the way.
-  [[nodiscard]] bool CloseInside(const PlacedPose& from, const VecX& target, PlacedPose* to) const;
   /// Free coordinates `x`, the held ones as they are to be.
   [[nodiscard]] VecX Target(const VecX& x) const;
 

@@ -31,9 +31,7 @@ constexpr double kDip = 1e-8;        // the same between two nodes, by their pol
 constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
-constexpr double kFar = 200.0;  // a ray that goes on for so long has no end
-constexpr double kBeforeEnd = 0.999;
-constexpr double kNeck = 1e-6;  // [rad, characteristic lengths]: what is narrower is none
+constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
 constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
 constexpr int kSpreadRows = 6;
@@ -125,7 +123,6 @@ const Chebyshev& Nodes() {
 struct Hit {
   PlacedPose at;
   int bound = -1;
-  bool is_crossing = false;  // of branches of the bound: the margin vanishes and grows again
 };
 
 Vec2 Turned(const VecX& v) { return {v[1], -v[0]}; }
@@ -168,17 +165,8 @@ class Tracer {
           return std::nullopt;
         }
       }
-      double out = h;
-      bool leaves = next.pose.margin.minCoeff() < 0.0;
-      std::optional<PoseSpace::Gap> gap;
-      if (!leaves) gap = GapWithin(at, h * along, next);
-      if (gap && gap->open) {
-        leaves = true;
-        out = gap->share * h;
-        next = std::move(gap->at);
-      }
-      if (leaves || gap) {
-        auto hit = leaves ? Exit(at, along, out, next) : CrossingAt(std::move(*gap));
+      if (next.pose.margin.minCoeff() < 0.0) {
+        auto hit = Exit(at, along, h, next);
         if (hit) return hit;
         h *= 0.5;  // it left the branch between both
         if (h >= kLeastStep) continue;
@@ -217,18 +205,6 @@ class Tracer {
                 std::vector<SpacePose>* inside);
 
  private:
-  [[nodiscard]] std::optional<PoseSpace::Gap> GapWithin(const PlacedPose& at, const VecX& step,
-                                                        const PlacedPose& next) const {
-    return space_.FindGap(
-        [&](double share, PlacedPose* to) { return space_.Step(at, share * step, to); },
-        at.pose.margin, next.pose.margin);
-  }
-  static std::optional<Hit> CrossingAt(PoseSpace::Gap gap) {
-    if (gap.at.pose.margin.size() == 0) return std::nullopt;
-    Eigen::Index least = 0;
-    gap.at.pose.margin.minCoeff(&least);
-    return Hit{std::move(gap.at), static_cast<int>(least), true};
-  }
   // The first bound between a pose inside and one that is not. Margins may vanish several times on
   // the way: again up to where the first root is, until no other one is negative there.
   std::optional<Hit> Exit(const PlacedPose& at, const VecX& along, double h, PlacedPose next) {
@@ -256,17 +232,7 @@ class Tracer {
       for (Eigen::Index j = 0; j < margin.size(); ++j) {
         inside = inside && (j == hit.bound || margin[j] >= -kBeyond);
       }
-      if (inside) {
-        // A little before the bound, where its margin is not 0.
-        const double before = kBeforeEnd * first;
-        PlacedPose short_of;
-        if (!space_.Step(at, before * along, &short_of)) return std::nullopt;
-        auto gap = GapWithin(at, before * along, short_of);
-        if (!gap) return hit;
-        if (!gap->open) return CrossingAt(std::move(*gap));
-        first = gap->share * before;
-        hit.at = std::move(gap->at);
-      }
+      if (inside) return hit;
       h = first;
       next = std::move(hit.at);
     }
@@ -491,13 +457,6 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
             why = "branches of the singularity that cross are not found";
             break;
           }
-          // A neck between branches that nearly cross is followed in smaller steps.
-          const double neck = kNeck * kNeck * H.norm() + kRoundings * 4 * kEps;
-          if (std::abs(crossing.pose.margin[here.bound]) > neck) {
-            failed = true;
-            why = "branches of the singularity nearly cross";
-            break;
-          }
           if (s < 0.0 || s > tau + 0.1 * h) {
             failed = true;
             why = "the set is on the other side";
@@ -540,9 +499,9 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       const Vec2 tail =
           (x * nodes.last.transpose()).cwiseAbs() + (x * nodes.one_before.transpose()).cwiseAbs();
       // Near a crossing, where its slope vanishes, the margin's rounding moves the curve.
-      const double blur = kRoundings * (s0 > 0.0 ? 4 * kEps / s0
-                                                 : std::abs(here.at.pose.margin[here.bound]) /
-                                                       (rate * h * nodes.node[1]));
+      const double blur = s0 > 0.0 ? 0.0
+                                   : kRoundings * std::abs(here.at.pose.margin[here.bound]) /
+                                         (rate * h * nodes.node[1]);
       failed = tail.maxCoeff() > kTail * size + blur && h > kLeastStep;
       if (failed) why = "it curves too much";
       if (!failed && Dips(at, here.bound)) {
@@ -643,56 +602,18 @@ bool Tracer::Knows(const std::vector<TracedLoop>& loops, const Hit& hit) const {
 }
 
 // Even and odd crossings of a line to the right.
-bool Holds(const TracedLoop& loop, const Vec2& p) {
+bool IsInside(const std::vector<TracedLoop>& loops, const Vec2& p) {
   bool inside = false;
-  for (const TracedArc& arc : loop.arcs) {
-    for (size_t k = 1; k < arc.points.size(); ++k) {
-      const Vec2 &a = arc.points[k - 1], &b = arc.points[k];
-      if ((a[1] > p[1]) == (b[1] > p[1])) continue;
-      if (p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])) inside = !inside;
+  for (const TracedLoop& loop : loops) {
+    for (const TracedArc& arc : loop.arcs) {
+      for (size_t k = 1; k < arc.points.size(); ++k) {
+        const Vec2 &a = arc.points[k - 1], &b = arc.points[k];
+        if ((a[1] > p[1]) == (b[1] > p[1])) continue;
+        if (p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])) inside = !inside;
+      }
     }
   }
   return inside;
-}
-bool IsInside(const std::vector<TracedLoop>& loops, const Vec2& p) {
-  return std::ranges::count_if(loops, [&](const TracedLoop& loop) { return Holds(loop, p); }) % 2;
-}
-
-// A part of the plane has one boundary outside, and its holes: of the loops around one of its
-// points the smallest one, and the holes in that. Parts that touch it at singular poses only lie
-// beside it, or in its holes, though rays may have stepped over to them. Which loops are those of
-// the parts of these points; the first `known` ones are.
-std::vector<bool> LoopsAround(const std::vector<TracedLoop>& loops, size_t known,
-                              const std::vector<Vec2>& points) {
-  const auto around = [&](const Vec2& p, size_t but) {
-    size_t smallest = loops.size();
-    for (size_t l = 0; l < loops.size(); ++l) {
-      if (l == but || !Holds(loops[l], p)) continue;
-      if (smallest == loops.size() || std::abs(loops[l].area) < std::abs(loops[smallest].area)) {
-        smallest = l;
-      }
-    }
-    return smallest;
-  };
-  std::vector<bool> kept(loops.size(), false);
-  std::fill_n(kept.begin(), known, true);
-  for (const Vec2& p : points) {
-    const size_t l = around(p, loops.size());
-    if (l < loops.size() && loops[l].area > 0.0) kept[l] = true;
-  }
-  for (size_t l = known; l < loops.size(); ++l) {
-    if (loops[l].area > 0.0) continue;
-    // A hole may touch others: by most of its arcs.
-    int votes = 0;
-    for (const TracedArc& arc : loops[l].arcs) {
-      const size_t outer = around(arc.points[arc.points.size() / 2], l);
-      votes += outer < loops.size() && loops[outer].area > 0.0 && kept[outer] ? 1 : -1;
-    }
-    kept[l] = votes > 0;
-  }
-  // None is found around these points: all of them, as they are.
-  if (std::ranges::find(kept, true) == kept.end()) kept.assign(loops.size(), true);
-  return kept;
 }
 
 // All over a section; another one may lose the neck between two parts, or a hole.
@@ -753,16 +674,15 @@ bool Tracer::Probe(const std::vector<Vec2>& points, TracedSection* section,
     VecX target = nearest->at;
     target.head<2>() = p;
     if (!space_.Place(*nearest, &from)) continue;
-    if (space_.CloseInside(from, target, &to)) {
+    if (space_.Close(from, target, &to) && to.pose.margin.minCoeff() > 0.0) {
       inside->push_back(to.pose);
       continue;
     }
     const auto hit = Walk(from, p - Vec2(from.pose.at.head<2>()));
-    if (!hit || hit->is_crossing || Knows(section->loops, *hit)) continue;
+    if (!hit || Knows(section->loops, *hit)) continue;
     trouble_.clear();
     TracedLoop loop = Trace(*hit);
     if (!loop.closed) return false;
-    if (loop.area > 0.0) continue;  // of another part
     section->area += loop.area;
     section->error += loop.error;
     section->loops.push_back(std::move(loop));
@@ -773,11 +693,9 @@ bool Tracer::Probe(const std::vector<Vec2>& points, TracedSection* section,
 bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* section,
                       std::vector<SpacePose>* inside) {
   const bool is_flat = !std::isfinite(section->height);
-  const size_t known = section->loops.size();
   std::vector<Hit> chords;  // a pose of each loop
   std::vector<std::pair<Hit, std::string>> lost;
   const auto offer = [&](const Hit& hit) {
-    if (hit.is_crossing) return false;
     if (Knows(section->loops, hit)) return true;
     trouble_.clear();
     TracedLoop loop = Trace(hit);
@@ -835,27 +753,13 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
       }
     }
   }
-  std::vector<Vec2> points;
-  for (const PlacedPose& seed : seeds) points.emplace_back(seed.pose.at.head<2>());
-  const std::vector<bool> kept = LoopsAround(section->loops, known, points);
-  std::vector<TracedLoop> loops, others;
-  for (size_t l = 0; l < kept.size(); ++l) {
-    (kept[l] ? loops : others).push_back(std::move(section->loops[l]));
-  }
-  section->loops = std::move(loops);
-  std::erase_if(*inside, [&](const SpacePose& pose) {
-    return IsInside(others, pose.at.head<2>()) && !IsInside(section->loops, pose.at.head<2>());
-  });
   section->area = section->error = 0.0;
   for (const TracedLoop& loop : section->loops) {
     section->area += loop.area;
     section->error += loop.error;
   }
-  // What is lost beside all parts is another one's.
-  const auto held = [&](const Vec2& p) { return IsInside(section->loops, p); };
-  const bool whole = std::ranges::all_of(points, held);
   for (const auto& [hit, why] : lost) {
-    if ((whole && !held(hit.at.pose.at.head<2>())) || Knows(section->loops, hit)) continue;
+    if (Knows(section->loops, hit)) continue;
     trouble_ = why;
     return false;
   }
@@ -1037,7 +941,8 @@ class SolidTracer {
         PlacedPose from, to;
         VecX target = pose.at;
         target[2] = height;
-        if (flat.Place(pose, &from) && flat.CloseInside(from, target, &to)) {
+        if (flat.Place(pose, &from) && flat.Close(from, target, &to) &&
+            to.pose.margin.minCoeff() > 0.0) {
           seeds.push_back(std::move(to));
         }
       }
@@ -1134,8 +1039,8 @@ class SolidTracer {
       PlacedPose from, to;
       VecX target = pose.at;
       target[2] = section.height;
-      if (tracer.space().Place(pose, &from) && tracer.space().CloseInside(from, target, &to) &&
-          !IsInside(section.loops, to.pose.at.head<2>())) {
+      if (tracer.space().Place(pose, &from) && tracer.space().Close(from, target, &to) &&
+          to.pose.margin.minCoeff() > 0.0 && !IsInside(section.loops, to.pose.at.head<2>())) {
         seeds.push_back(std::move(to));
       }
     }
@@ -1383,7 +1288,7 @@ std::vector<TracedArc> TraceInside(const PoseSpace& space, int bound,
     if (!space.Place(in, &from)) continue;
     const VecX ray = (out.at - in.at).head(2);
     const auto hit = tracer.Walk(from, ray);
-    if (!hit || hit->bound != bound || hit->is_crossing || tracer.Knows(found, *hit)) continue;
+    if (!hit || hit->bound != bound || tracer.Knows(found, *hit)) continue;
     for (const int open : {1, -1}) {
       TracedLoop part = tracer.Trace(*hit, open);
       if (part.arcs.empty()) continue;
