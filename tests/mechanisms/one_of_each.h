@@ -90,20 +90,6 @@ inline void AddOneOfEach(Mechanism* m) {
   m->elements.push_back({.name = "buffer",
                          .spring = static_cast<int>(m->springs.size()) - 1,
                          .law = StopLaw{.upper = 0.5, .stiffness = 30.0, .damping = 0.4}});
-  m->elements.push_back(
-      {.name = "gas",
-       .spring = static_cast<int>(m->springs.size()) - 1,
-       .law = CurvesLaw{.rates = {-3.0, 60.0, 90.0},
-                        .curves = {{.knots = {{0.0, 4.0, -1.0, -1.0}, {9.0, 2.0, 0.3, 0.3}}},
-                                   {.knots = {{0.0, 3.0, -0.5, -0.5}, {9.0, 1.0, -0.2, -0.2}}},
-                                   {.knots = {{0.0, 1.0, -0.2, -0.2}, {9.0, -1.0, -0.4, -0.4}}}}}});
-  m->elements.push_back({.name = "magnet",
-                         .spring = static_cast<int>(m->springs.size()) - 1,
-                         .law = ExpressionLaw{.text = "-3*v^3/(1 + v^2) + 2/(1 + x^2)",
-                                              .force = [](double x, double v) {
-                                                return -3.0 * v * v * v / (1.0 + v * v) +
-                                                       2.0 / (1.0 + x * x);
-                                              }}});
   if (m->bodies.size() > 2) {
     Bushing bushing;
     bushing.name = "bush", bushing.parent = 1, bushing.child = last;
