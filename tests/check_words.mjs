@@ -22,6 +22,8 @@ const WORDS = [
   [/\bconcessions?\b/i, 'waiver'],
   [/\bdoubts?\b/i, 'caveat, warning'],
   [/\bsightings?\b/i, 'detection'],
+  // The key "declined" of the witness protocol and of reports stays.
+  [/(?<!["`])\bdeclin(?:e|es|ed|ing)\b(?!["`:])/i, 'is not applicable: reason'],
   [/\bis none of\b/i, 'is not one of'],
   [/\bis no number\b/i, 'is not a number'],
   [/\bso many\b/i, 'number of …, this many'],

@@ -17,7 +17,7 @@ import os
 PLAIN = ("revolute", "prismatic", "fixed")
 
 
-class Declined(Exception):
+class NotApplicable(Exception):
     pass
 
 
@@ -49,7 +49,7 @@ def solve(A, b):
     for k in range(n):
         pivot = max(range(k, n), key=lambda i: abs(rows[i][k]))
         if abs(rows[pivot][k]) < 1e-12:
-            raise Declined("the rows of joints and drives are singular")
+            raise NotApplicable("the rows of joints and drives are singular")
         rows[k], rows[pivot] = rows[pivot], rows[k]
         for i in range(k + 1, n):
             factor = rows[i][k] / rows[k][k]
@@ -66,7 +66,7 @@ class Planar:
         self.m = mechanism
         for what in ("springs", "couplings", "bushings", "elements", "prescribed"):
             if mechanism[what]:
-                raise Declined(f"it has {what}")
+                raise NotApplicable(f"it has {what}")
         self.bodies = {body["name"]: body for body in mechanism["bodies"]}
         self.index = {body["name"]: k - 1 for k, body in enumerate(mechanism["bodies"])}
         self.joints = {joint["name"]: joint for joint in mechanism["joints"]}
@@ -77,7 +77,7 @@ class Planar:
         for drive in mechanism["drives"]:
             self.add_drive(drive)
         if len(self.rows) != 3 * (len(self.bodies) - 1):
-            raise Declined(f"{len(self.rows)} rows of joints and drives for "
+            raise NotApplicable(f"{len(self.rows)} rows of joints and drives for "
                            f"{3 * (len(self.bodies) - 1)} coordinates")
 
     # --- the plane -----------------------------------------------------------------------------
@@ -88,12 +88,12 @@ class Planar:
     def find_plane(self):
         turns = [self.axis_at_home(j) for j in self.joints.values() if j["kind"] == "revolute"]
         if not turns or any(j["kind"] not in PLAIN for j in self.joints.values()):
-            raise Declined("only revolute, prismatic and fixed joints are known")
+            raise NotApplicable("only revolute, prismatic and fixed joints are known")
         self.n = turns[0]
         slides = [self.axis_at_home(j) for j in self.joints.values() if j["kind"] == "prismatic"]
         if (any(math.hypot(*cross(self.n, a)) > 1e-9 for a in turns)
                 or any(abs(dot(self.n, a)) > 1e-9 for a in slides)):
-            raise Declined("it does not move in a plane")
+            raise NotApplicable("it does not move in a plane")
         away = min(([1, 0, 0], [0, 1, 0], [0, 0, 1]), key=lambda e: abs(dot(e, self.n)))
         e1 = cross(away, self.n)
         self.e1 = [x / math.hypot(*e1) for x in e1]
@@ -250,7 +250,7 @@ class Planar:
             if max(map(abs, step)) < 1e-13:
                 break
         else:
-            raise Declined(f"no closed loops at t = {motion['time_s']} s")
+            raise NotApplicable(f"no closed loops at t = {motion['time_s']} s")
         self.qd = solve(J, self.driven(motion, "velocity"))
         residual, J, bias = self.evaluate(q, self.qd)
         qdd = solve(J, [a - b for a, b in zip(self.driven(motion, "acceleration"), bias)])
@@ -272,7 +272,7 @@ def main():
               "declined": [{"what": "joint reactions", "why": "only drive forces are computed"}]}
     try:
         if os.path.exists("start.csv"):
-            raise Declined("free motions need an integrator, which it has not")
+            raise NotApplicable("free motions need an integrator, which it has not")
         with open("mechanism.json") as file:
             planar = Planar(json.load(file))
         with open("motion.csv") as file:
@@ -290,7 +290,7 @@ def main():
             writer.writeheader()
             for record in records:
                 writer.writerow({k: repr(v) for k, v in record.items()})
-    except Declined as why:
+    except NotApplicable as why:
         answer["refused"] = str(why)
     with open("witness.json", "w") as file:
         json.dump(answer, file, indent=1)

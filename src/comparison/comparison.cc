@@ -49,7 +49,7 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
   }
   for (const Witness& witness : input.witnesses) {
     if (!witness.foreign) continue;
-    for (const auto& [what, why] : witness.foreign->declined) {
+    for (const auto& [what, why] : witness.foreign->left_out) {
       note(witness.name + ": " + what, why.c_str());
     }
   }
@@ -446,7 +446,7 @@ const char* ToText(WitnessGap gap) {
       return "no_answer";
     case WitnessGap::kBadAnswer:
       return "bad_answer";
-    case WitnessGap::kDeclined:
+    case WitnessGap::kOutOfScope:
       return "declined";
     case WitnessGap::kNoForces:
       return "no_forces";

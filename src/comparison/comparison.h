@@ -40,10 +40,10 @@ enum class WitnessGap {
   kExitCode,       ///< it ended with one that is not 0
   kSignal,
   kTimedOut,
-  kNoAnswer,   ///< it left no files, or longer ones than they may be
-  kBadAnswer,  ///< its files are not what docs/how-to/external_solvers.md asks for
-  kDeclined,   ///< it states that the mechanism or motion is beyond it
-  kNoForces,   ///< it answered, without drive forces that another witness has, too
+  kNoAnswer,    ///< it left no files, or longer ones than they may be
+  kBadAnswer,   ///< its files are not what docs/how-to/external_solvers.md asks for
+  kOutOfScope,  ///< it states that the mechanism or motion is beyond it
+  kNoForces,    ///< it answered, without drive forces that another witness has, too
 };
 [[nodiscard]] const char* ToText(WitnessGap gap);  ///< "timed_out"; "" of kNone
 
@@ -60,7 +60,7 @@ struct Witness {
     std::string program;
     LimitColumn limits = LimitColumn::kReference;
     std::optional<double> force_nrmse;  ///< instead of that limit
-    std::vector<std::pair<std::string, std::string>> declined = {};
+    std::vector<std::pair<std::string, std::string>> left_out = {};
     double compute_s = kNan;  ///< without its start, reading and writing, as it says itself
   };
   std::optional<Foreign> foreign = {};

@@ -47,7 +47,7 @@ WitnessAnswer AnswerOf(const JsonValue& json) {
   }
   if (States(json, "declined")) {
     for (const JsonValue& entry : json.at("declined").list()) {
-      answer.declined.emplace_back(TextAt(entry, "what"), TextAt(entry, "why"));
+      answer.left_out.emplace_back(TextAt(entry, "what"), TextAt(entry, "why"));
     }
   }
   if (answer.program.empty()) json.Refuse("names no program");

@@ -22,7 +22,7 @@ struct WitnessAnswer {
   std::string program, version;
   std::string method;   ///< what computes, one sentence; may be empty
   std::string refused;  ///< why it does not compute this case; "" if it does
-  std::vector<std::pair<std::string, std::string>> declined = {};  ///< what it leaves out, and why
+  std::vector<std::pair<std::string, std::string>> left_out = {};  ///< what it leaves out, and why
   double compute_s = kNan;  ///< processor time of its computation alone; NaN: not stated
 };
 

@@ -161,6 +161,15 @@ std::vector<double> InputsOf(const Mechanism& mechanism, const BodyStates& state
   return inputs;
 }
 
+double ValueAtStates(const Mechanism& mechanism, const BodyStates& states,
+                     const StateFunction& function, double t_s) {
+  const int branch = function.number < 0
+                         ? kAnyBranch
+                         : states.Branch(mechanism.elements.size() +
+                                         static_cast<size_t>(function.number));
+  return function.At(t_s, InputsOf(mechanism, states, function), branch);
+}
+
 LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,
                     const LoadSample& sample) {
   LoadSample at = sample;
@@ -168,7 +177,7 @@ LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,
   for (const Load::Following& part : sample.load->following) {
     Vec3& vector = part.component < 3 ? at.force : at.moment;
     vector[part.component % 3] +=
-        part.function.value(sample.time_s, InputsOf(mechanism, states, part.function));
+        ValueAtStates(mechanism, states, part.function, sample.time_s);
   }
   return at;
 }
@@ -177,7 +186,7 @@ double ForceAtStates(const Mechanism& mechanism, const BodyStates& states, const
                      double t_s) {
   const double given = Evaluate(force.force, t_s).value;
   if (!force.following) return given;
-  return given + force.following->value(t_s, InputsOf(mechanism, states, *force.following));
+  return given + ValueAtStates(mechanism, states, *force.following, t_s);
 }
 
 RunSummary CheckForcesAt(const Mechanism& mechanism, const BodyStates& states, double t_s,

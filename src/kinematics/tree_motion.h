@@ -58,6 +58,9 @@ void PredictAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>&
 /// The inputs of a function of the mechanism's state, angles in the turns that states count.
 [[nodiscard]] std::vector<double> InputsOf(const Mechanism& mechanism, const BodyStates& states,
                                            const StateFunction& function);
+/// What the function gives at the states, on their branch.
+[[nodiscard]] double ValueAtStates(const Mechanism& mechanism, const BodyStates& states,
+                                   const StateFunction& function, double t_s);
 /// The load at the states: its sample with what follows from coordinates and rates added. `load`
 /// and `time_s` of the sample must be set where there is such a part.
 [[nodiscard]] LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,

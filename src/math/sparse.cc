@@ -34,28 +34,28 @@ int SignOf(const int* to, int n, std::vector<char>* seen) {
 
 }  // namespace
 
-// The order of elimination of a pattern, which only reads it.
-struct Analysis {
-  Analysis() = default;
-  ~Analysis() {
-    klu_common common{};
-    klu_defaults(&common);
-    if (symbolic != nullptr) klu_free_symbolic(&symbolic, &common);
-  }
-  Analysis(const Analysis&) = delete;
-  Analysis& operator=(const Analysis&) = delete;
-
-  [[nodiscard]] bool IsOf(std::span<const int> other_columns,
-                          std::span<const int> other_rows) const {
-    return std::ranges::equal(columns, other_columns) && std::ranges::equal(rows, other_rows);
-  }
-
-  std::vector<int> columns, rows;
-  klu_symbolic* symbolic = nullptr;
-};
-
 // KLU takes pointers to what it does not change without const.
 struct SparseLu::Factors {
+  // The order of elimination of a pattern, which only reads it.
+  struct Analysis {
+    Analysis() = default;
+    ~Analysis() {
+      klu_common common{};
+      klu_defaults(&common);
+      if (symbolic != nullptr) klu_free_symbolic(&symbolic, &common);
+    }
+    Analysis(const Analysis&) = delete;
+    Analysis& operator=(const Analysis&) = delete;
+
+    [[nodiscard]] bool IsOf(std::span<const int> other_columns,
+                            std::span<const int> other_rows) const {
+      return std::ranges::equal(columns, other_columns) && std::ranges::equal(rows, other_rows);
+    }
+
+    std::vector<int> columns, rows;
+    klu_symbolic* symbolic = nullptr;
+  };
+
   Factors() {
     klu_defaults(&common);
     common.tol = kPivotTolerance;
@@ -69,7 +69,6 @@ struct SparseLu::Factors {
   void Clear() {
     if (numeric != nullptr) klu_free_numeric(&numeric, &common);
     analysis.reset();
-    symbolic = nullptr;
   }
   // Each pose of a study has the patterns of the pose before.
   void Analyse(int* columns, int* rows) {
@@ -87,19 +86,21 @@ struct SparseLu::Factors {
       analysis->symbolic = klu_analyze(n, columns, rows, &common);
       known[next++ % known.size()] = analysis;
     }
-    symbolic = analysis->symbolic;
+  }
+  [[nodiscard]] klu_symbolic* symbolic() const {
+    return analysis == nullptr ? nullptr : analysis->symbolic;
   }
   [[nodiscard]] bool FactorAnew(int* columns, int* rows, double* values) {
     if (numeric != nullptr) klu_free_numeric(&numeric, &common);
-    numeric = klu_factor(columns, rows, values, symbolic, &common);
+    numeric = klu_factor(columns, rows, values, symbolic(), &common);
     if (numeric == nullptr) return false;
-    sign = SignOf(numeric->Pnum, n, &seen) * SignOf(symbolic->Q, n, &seen);
+    sign = SignOf(numeric->Pnum, n, &seen) * SignOf(symbolic()->Q, n, &seen);
     chosen = Eigen::Map<const VecX>(pivots(), n).cwiseAbs();
     return true;
   }
   [[nodiscard]] bool FactorAgain(int* columns, int* rows, double* values) {
     if (numeric == nullptr) return false;
-    if (klu_refactor(columns, rows, values, symbolic, numeric, &common) == 0) return false;
+    if (klu_refactor(columns, rows, values, symbolic(), numeric, &common) == 0) return false;
     for (int k = 0; k < n; ++k) {
       if (!(std::abs(pivots()[k]) > kSmaller * chosen[k])) return false;
     }
@@ -115,7 +116,6 @@ struct SparseLu::Factors {
 
   klu_common common{};
   std::shared_ptr<Analysis> analysis;
-  klu_symbolic* symbolic = nullptr;  // of it
   klu_numeric* numeric = nullptr;
   int n = 0, sign = 1;  // sign: of both permutations
   VecX chosen;          // sizes of the pivots when they were chosen
@@ -135,11 +135,11 @@ bool SparseLu::Factor(const Matrix& A) {
   auto* columns = const_cast<int*>(A.outerIndexPtr());
   auto* rows = const_cast<int*>(A.innerIndexPtr());
   auto* values = const_cast<double*>(A.valuePtr());
-  if (f.symbolic == nullptr) {
+  if (f.symbolic() == nullptr) {
     f.n = static_cast<int>(A.cols());
     if (f.n == 0) return true;
     f.Analyse(columns, rows);
-    if (f.symbolic == nullptr) return false;
+    if (f.symbolic() == nullptr) return false;
   }
   MBV_DEMAND(f.n == A.cols(), A.cols());
   if (f.FactorAgain(columns, rows, values)) return f.IsRegular();
@@ -166,14 +166,14 @@ void SparseLu::Solve(VecX* b) const {
   Factors& f = *factors_;
   if (f.n == 0) return;
   MBV_DEMAND(f.numeric != nullptr && b->size() == f.n, b->size());
-  klu_solve(f.symbolic, f.numeric, f.n, 1, b->data(), &f.common);
+  klu_solve(f.symbolic(), f.numeric, f.n, 1, b->data(), &f.common);
 }
 
 void SparseLu::SolveTransposed(VecX* b) const {
   Factors& f = *factors_;
   if (f.n == 0) return;
   MBV_DEMAND(f.numeric != nullptr && b->size() == f.n, b->size());
-  klu_tsolve(f.symbolic, f.numeric, f.n, 1, b->data(), &f.common);
+  klu_tsolve(f.symbolic(), f.numeric, f.n, 1, b->data(), &f.common);
 }
 
 namespace {

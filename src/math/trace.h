@@ -103,7 +103,8 @@ class ChannelColumns {
   std::array<std::vector<int>, static_cast<size_t>(Quantity::kCount_)> columns_;
 };
 
-/// What a force element does from an instant on, in a motion by forces.
+/// What a force element, or a force by an expression, does from an instant on, in a motion by
+/// forces.
 enum class Happening {
   kRests,        ///< dry friction: accelerations jump
   kSlidesUp,     ///< towards larger values of its coordinate
@@ -111,7 +112,8 @@ enum class Happening {
   kSwitchedOff,  ///< a brake, a clutch
   kHitsUpper,    ///< a rigid stop: rates jump
   kHitsLower,
-  kFree,  ///< a stop
+  kBranch,  ///< an expression, on another branch: it may jump
+  kFree,    ///< a stop
   kUpperEnd,
   kLowerEnd,
   kKnot  ///< a curve, beyond one of its corners
@@ -121,8 +123,8 @@ struct MotionEvent {
   std::string element = {};
   Happening what = Happening::kRests;
 
-  /// True where accelerations jump.
-  [[nodiscard]] bool jumps() const { return what <= Happening::kHitsLower; }
+  /// True where accelerations may jump.
+  [[nodiscard]] bool jumps() const { return what <= Happening::kBranch; }
 };
 
 [[nodiscard]] const char* ToText(Happening what);

@@ -213,6 +213,9 @@ int PieceOf(const CurvesLaw& law, double q, double v) {
                : std::clamp(static_cast<int>(slower), 1, static_cast<int>(law.rates.size()) - 1);
   return strip * (knots + 1) + before;
 }
+int PieceOf(const ExpressionLaw& law, double q, double v) {
+  return law.branch ? law.branch(q, v) : 0;
+}
 template <typename Law>
 int PieceOf(const Law& /*law*/, double /*q*/, double /*v*/) {
   return 0;
@@ -227,6 +230,9 @@ int PieceOf(const ForceElement& element, double position, double rate) {
 bool HasCorners(const ForceElement& element) {
   if (const auto* curve = std::get_if<CurveLaw>(&element.law)) {
     return std::ranges::any_of(curve->knots, IsCorner);
+  }
+  if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
+    return static_cast<bool>(expression->branch);
   }
   return std::holds_alternative<StopLaw>(element.law) ||
          std::holds_alternative<CurvesLaw>(element.law);

@@ -429,10 +429,27 @@ struct CurvesLaw {
   bool held = false;             ///< beyond the first and the last rate; else straight on
 };
 
+/// Where no branch of an expression is fixed.
+inline constexpr int kAnyBranch = -1;
+
 /// A force that an expression gives, positive as a drive's.
 struct ExpressionLaw {
   std::string text;  ///< of x, the coordinate, and v, its rate, with the values of parameters
   std::function<double(double position, double rate)> force;
+  /// Where comparisons, abs, min … decide between formulas: the number of the branch that holds
+  /// there, and the force by a branch wherever it is taken; empty where nothing decides.
+  std::function<int(double position, double rate)> branch = {};
+  std::function<double(int branch, double position, double rate)> on_branch = {};
+
+  /// By this branch; kAnyBranch: by the one that holds.
+  [[nodiscard]] double At(double position, double rate, int by_branch) const {
+    const bool fixed = on_branch && by_branch != kAnyBranch;
+    return fixed ? on_branch(by_branch, position, rate) : force(position, rate);
+  }
+  /// kAnyBranch where nothing decides.
+  [[nodiscard]] int BranchAt(double position, double rate) const {
+    return branch ? branch(position, rate) : kAnyBranch;
+  }
 };
 
 /// Frames F on the parent and M on the child that a bushing joins. Its six coordinates are the

@@ -236,6 +236,13 @@ std::vector<double> AllTimes(const Motion& motion, const TimesOf& times_of) {
       add(load.force[c]);
       add(load.moment[c]);
     }
+    for (const Load::Following& part : load.following) {
+      for (const Profile& signal : part.function.signals) add(signal);
+    }
+  }
+  for (const DriveForce& force : motion.forces) {
+    if (!force.following) continue;
+    for (const Profile& signal : force.following->signals) add(signal);
   }
   std::sort(all.begin(), all.end());
   return all;
@@ -249,6 +256,22 @@ std::vector<double> BreakTimes(const Motion& motion) {
 
 std::vector<double> JumpTimes(const Motion& motion) {
   return AllTimes(motion, [](const Profile& profile) { return JumpTimes(profile); });
+}
+
+std::vector<BranchingFunction> BranchingFunctions(const Mechanism& mechanism,
+                                                  const Motion& motion) {
+  std::vector<BranchingFunction> all;
+  for (const Load& load : motion.loads) {
+    for (const Load::Following& part : load.following) {
+      if (part.function.branch) all.push_back({PathOf(load, part), &part.function});
+    }
+  }
+  for (const DriveForce& force : motion.forces) {
+    if (!force.following || !force.following->branch) continue;
+    all.push_back({PathOf(mechanism, force), &*force.following});
+  }
+  std::ranges::sort(all, {}, [](const BranchingFunction& one) { return one.function->number; });
+  return all;
 }
 
 // Between breaks signals are smooth, and do not vanish at all of these times by chance.

@@ -91,6 +91,17 @@ struct StateFunction {
   };
   std::vector<Input> inputs;
   std::function<double(double t_s, std::span<const double> inputs)> value;
+  /// As in ExpressionLaw.
+  std::function<int(double t_s, std::span<const double> inputs)> branch = {};
+  std::function<double(int branch, double t_s, std::span<const double> inputs)> on_branch = {};
+  int number = -1;                    ///< among those of its motion that have branches
+  std::vector<Profile> signals = {};  ///< of the time, which `value` knows; here for their breaks
+
+  /// By this branch; kAnyBranch: by the one that holds.
+  [[nodiscard]] double At(double t_s, std::span<const double> at, int by_branch) const {
+    const bool fixed = on_branch && by_branch != kAnyBranch;
+    return fixed ? on_branch(by_branch, t_s, at) : value(t_s, at);
+  }
 };
 
 /// An external wrench on a body, acting at point Q fixed in the body.
@@ -222,6 +233,15 @@ struct DrivenSample {
 [[nodiscard]] std::vector<double> BreakTimes(const Motion& motion);
 /// Those of them at which forces jump (JumpTimes() of profiles).
 [[nodiscard]] std::vector<double> JumpTimes(const Motion& motion);
+/// What loads and given drive forces are in addition to their profiles, where that has branches;
+/// by the path in the scenario.
+struct BranchingFunction {
+  std::string path;
+  const StateFunction* function = nullptr;
+};
+/// By StateFunction::number; `motion` outlives the list.
+[[nodiscard]] std::vector<BranchingFunction> BranchingFunctions(const Mechanism& mechanism,
+                                                                const Motion& motion);
 /// Elements that are switched off from one time to another, increasing: they neither hold nor
 /// slide.
 [[nodiscard]] std::vector<size_t> SwitchedOff(const Motion& motion, double from_s, double to_s);
@@ -256,6 +276,12 @@ struct BodyStates {
   std::vector<double> turns;
   /// Share of its force with which a force element acts (Switch); of those beyond the end 1.
   std::vector<double> engaged = {};
+  /// Branches by which expressions are taken: per force element, then per StateFunction::number;
+  /// of those beyond the end kAnyBranch.
+  std::vector<int> branches = {};
+  [[nodiscard]] int Branch(size_t at) const {
+    return at < branches.size() ? branches[at] : kAnyBranch;
+  }
   [[nodiscard]] double Engaged(size_t element) const {
     return element < engaged.size() ? engaged[element] : 1.0;
   }

@@ -534,6 +534,14 @@ std::optional<ExpressionLaw> ElementReader::ReadExpression(const Block& block, c
   ExpressionLaw law{.text = {}, .force = [formula = compiled.formula](double x, double v) {
                       return formula->At(std::array{x, v});
                     }};
+  if (compiled.formula->has_branches()) {
+    law.branch = [formula = compiled.formula](double x, double v) {
+      return formula->BranchAt(std::array{x, v});
+    };
+    law.on_branch = [formula = compiled.formula](int branch, double x, double v) {
+      return formula->OnBranch(branch, std::array{x, v});
+    };
+  }
   for (size_t i = 0; i < text->size();) {
     size_t end = i;
     while (end < text->size() && is_word((*text)[end])) ++end;

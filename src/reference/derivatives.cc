@@ -32,7 +32,8 @@ void Take(const ScalarRow& row, double force, std::vector<Vec6>* wrenches) {
 struct Varying {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
   double d_position = 0.0, d_rate = 0.0, d_acceleration = 0.0;
-  int sign = 0;  ///< FrictionDirections()
+  int sign = 0;       ///< FrictionDirections()
+  double unit = 1.0;  ///< a large way: 1 rad, or the characteristic length
   Vec3 axis = Vec3::Zero(), w = Vec3::Zero(), e = Vec3::Zero();
   Vec3 d_axis = Vec3::Zero(), dw = Vec3::Zero(), de = Vec3::Zero();
 };
@@ -110,10 +111,12 @@ ForceAndSlope Vary(const CurvesLaw& law, const Varying& at) {
           c.slope + (b.slope - c.slope) * t + (b.force - c.force) * dt};
 }
 ForceAndSlope Vary(const ExpressionLaw& law, const Varying& at) {
-  constexpr double kReach = 0.1;  // of the differences [m or rad, per second]
-  const double by_x = SlopeAt([&](double x) { return law.force(x, at.rate); }, at.position, kReach);
-  const double by_v = SlopeAt([&](double v) { return law.force(at.position, v); }, at.rate, kReach);
-  return {law.force(at.position, at.rate), by_x * at.d_position + by_v * at.d_rate};
+  const double reach = 0.1 * at.unit;  // as in VaryFollowing()
+  const int branch = law.BranchAt(at.position, at.rate);  // one-sided at corners
+  const auto force = [&](double x, double v) { return law.At(x, v, branch); };
+  const double by_x = SlopeAt([&](double x) { return force(x, at.rate); }, at.position, reach);
+  const double by_v = SlopeAt([&](double v) { return force(at.position, v); }, at.rate, reach);
+  return {force(at.position, at.rate), by_x * at.d_position + by_v * at.d_rate};
 }
 ForceAndSlope Vary(const FrictionLaw& law, const Varying& at) {
   const double sense = law.sense(at.sign);
@@ -167,6 +170,8 @@ Vec6 ForceVariations::VaryFollowing(const BodyStates& states, const LoadSample& 
   if (sample.load == nullptr) return varied;
   for (const Load::Following& part : sample.load->following) {
     std::vector<double> inputs = InputsOf(mechanism_, states, part.function);
+    const int branch =
+        part.function.branch ? part.function.branch(sample.time_s, inputs) : kAnyBranch;
     for (size_t k = 0; k < inputs.size(); ++k) {
       const StateFunction::Input& input = part.function.inputs[k];
       const ScalarRow row = CoordinateRow(mechanism_, input.coordinate, states, input.near);
@@ -179,7 +184,7 @@ Vec6 ForceVariations::VaryFollowing(const BodyStates& states, const LoadSample& 
       const double slope = SlopeAt(
           [&](double x) {
             inputs[k] = x;
-            return part.function.value(sample.time_s, inputs);
+            return part.function.At(sample.time_s, inputs, branch);
           },
           at, 0.1 * unit);
       inputs[k] = at;
@@ -252,6 +257,7 @@ void ForceVariations::VaryElements(const BodyStates& states, const std::vector<i
                           Along(VariedElementRow(mechanism_, e, states, dV), states.V_WB);
     }
     at.sign = friction_signs.empty() ? 0 : friction_signs[e];
+    at.unit = ActsOnLength(mechanism_, element) ? length_ : 1.0;
     const bool carried = rotor != nullptr && rotor->carrier.has_value();
     if (carried) {
       const auto b = static_cast<size_t>(rotor->carrier->body);

@@ -14,6 +14,7 @@ struct AlongElement {
   int friction_sign = 0;                                           // sign of the rate, 0 at rest
   double engaged = 1.0;                                            // share that acts
   Vec3 axis_W = Vec3::Zero(), w = Vec3::Zero(), e = Vec3::Zero();  // of a rotor's carrier
+  int branch = kAnyBranch;                                         // of an expression
 };
 
 AlongElement MotionOf(const ForceElement& element, const ScalarRow& row, const BodyStates& states,
@@ -131,7 +132,7 @@ double ForceOf(const CurvesLaw& law, const AlongElement& at) {
   return at.engaged * AtRate(law, at.position, at.rate).force;
 }
 double ForceOf(const ExpressionLaw& law, const AlongElement& at) {
-  return at.engaged * law.force(at.position, at.rate);
+  return at.engaged * law.At(at.position, at.rate, at.branch);
 }
 
 // (5), on the body that carries a rotor.
@@ -196,8 +197,10 @@ void AddPower(const ExpressionLaw& law, const AlongElement& at, Powers* power) {
   power->dampers += ForceOf(law, at) * at.rate;
 }
 
-ElementSlope Slope(const DampingLaw& law, double /*q*/) { return {0.0, law.damping}; }
-ElementSlope Slope(const SpringLaw& law, double q) {
+ElementSlope Slope(const DampingLaw& law, double /*q*/, double /*unit*/) {
+  return {0.0, law.damping};
+}
+ElementSlope Slope(const SpringLaw& law, double q, double /*unit*/) {
   const double x = q - law.free;
   double slope = 0.0;
   for (size_t i = law.polynomial.size(); i-- > 0;) {
@@ -205,26 +208,27 @@ ElementSlope Slope(const SpringLaw& law, double q) {
   }
   return {slope, 0.0};
 }
-ElementSlope Slope(const RotorLaw& /*law*/, double /*q*/) { return {}; }
-ElementSlope Slope(const FrictionLaw& /*law*/, double /*q*/) { return {}; }
-ElementSlope Slope(const StopLaw& law, double q) {
+ElementSlope Slope(const RotorLaw& /*law*/, double /*q*/, double /*unit*/) { return {}; }
+ElementSlope Slope(const FrictionLaw& /*law*/, double /*q*/, double /*unit*/) { return {}; }
+ElementSlope Slope(const StopLaw& law, double q, double /*unit*/) {
   const Depth in = DepthIn(law, {.position = q});
   if (in.depth == 0.0) return {};
   return {law.exponent * Elastic(law, in) / in.depth,
           law.damping + law.dissipation * Elastic(law, in)};
 }
-ElementSlope Slope(const CurveLaw& law, double q) {
+ElementSlope Slope(const CurveLaw& law, double q, double /*unit*/) {
   return law.of_rate ? ElementSlope{0.0, -CurveAt(law, 0.0).slope}
                      : ElementSlope{-CurveAt(law, q).slope, 0.0};
 }
 
-ElementSlope Slope(const CurvesLaw& law, double q) {
+ElementSlope Slope(const CurvesLaw& law, double q, double /*unit*/) {
   const BetweenCurves at = AtRate(law, q, 0.0);
   return {-at.over_position, -at.over_rate};
 }
-ElementSlope Slope(const ExpressionLaw& law, double q) {
-  return {-SlopeAt([&](double x) { return law.force(x, 0.0); }, q, 0.1),
-          -SlopeAt([&](double v) { return law.force(q, v); }, 0.0, 0.1)};
+ElementSlope Slope(const ExpressionLaw& law, double q, double unit) {
+  const int branch = law.BranchAt(q, 0.0);
+  return {-SlopeAt([&](double x) { return law.At(x, 0.0, branch); }, q, 0.1 * unit),
+          -SlopeAt([&](double v) { return law.At(q, v, branch); }, 0.0, 0.1 * unit)};
 }
 
 // visit(law, motion) of every element.
@@ -234,8 +238,9 @@ void ForElements(const Mechanism& mechanism, const BodyStates& states,
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
     const ScalarRow row = ElementRow(mechanism, e, states);
-    const AlongElement at = MotionOf(
+    AlongElement at = MotionOf(
         element, row, states, friction_signs.empty() ? 0 : friction_signs[e], states.Engaged(e));
+    at.branch = states.Branch(e);
     std::visit([&](const auto& law) { visit(law, row, at); }, element.law);
   }
 }
@@ -347,8 +352,8 @@ void ForRotorInertias(const Mechanism& mechanism, const BodyStates& states, cons
   }
 }
 
-ElementSlope SlopeOf(const ForceElement& element, double q) {
-  return std::visit([q](const auto& law) { return Slope(law, q); }, element.law);
+ElementSlope SlopeOf(const ForceElement& element, double q, double unit) {
+  return std::visit([=](const auto& law) { return Slope(law, q, unit); }, element.law);
 }
 
 namespace {

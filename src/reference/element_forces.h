@@ -59,11 +59,11 @@ using AddInertia = std::function<void(size_t row_body, size_t column_body, const
 void ForRotorInertias(const Mechanism& mechanism, const BodyStates& states, const AddInertia& add);
 
 /// An element's slope of force over position and over rate, along `u` the gradient of its
-/// coordinate: what vibrates or creeps.
+/// coordinate: what vibrates or creeps. `unit`: 1 rad, or the characteristic length.
 struct ElementSlope {
   double stiffness = 0.0, damping = 0.0;
 };
-[[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double q);
+[[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double q, double unit);
 
 // Friction that grows with the joint's own reaction, or with a coupling's force. Internal to
 // reference/.

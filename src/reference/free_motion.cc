@@ -24,6 +24,7 @@ namespace {
 namespace odeint = boost::numeric::odeint;
 
 constexpr double kSmallestStepShare = 1e-10;  // of the duration
+constexpr int kMostBranched = 4;  // at one time: a branch that is left for one that leads back
 constexpr double kCornerShare = 1e-10;        // of a step: how well a corner is found
 constexpr double kJump = 1e-6;                // a smaller share of a load is not a jump
 // Below this share of the largest pivot steps go half the way to the singular pose at most.
@@ -129,15 +130,23 @@ FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double 
       time_(motion),
       dt_(std::min({motion.sample_s, largest_step_s, 1e-3})),
       tolerance_(tolerance),
+      branching_(BranchingFunctions(mechanism, motion)),
       fresh_(mechanism.elements.size(), 0) {
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     if (HasFriction(mechanism.elements[e])) friction_elements_.push_back(e);
     const auto* stop = std::get_if<StopLaw>(&mechanism.elements[e].law);
     const bool rigid = stop != nullptr && stop->rigid();
-    if (HasCorners(mechanism.elements[e]) && !rigid) corner_elements_.push_back(e);
+    const bool branches = std::holds_alternative<ExpressionLaw>(mechanism.elements[e].law);
+    if (!HasCorners(mechanism.elements[e]) || rigid) continue;
+    (branches ? branch_elements_ : corner_elements_).push_back(e);
   }
   FindEnds();
   now_.states.Resize(mechanism.bodies.size());
+  if (has_branches()) {
+    const int functions = branching_.empty() ? 0 : branching_.back().function->number + 1;
+    now_.states.branches.assign(mechanism.elements.size() + static_cast<size_t>(functions),
+                                kAnyBranch);
+  }
   work_states_ = sampled_ = now_.states;
   double mass = 0.0;
   for (const Body& body : mechanism.bodies) mass += body.mass;
@@ -173,7 +182,9 @@ void FreeMotion::Unpack(const State& x, BodyStates* states, VecX* work) const {
 }
 
 RunSummary FreeMotion::Start(const BodyStates& states) {
+  const std::vector<int> branches = now_.states.branches;
   now_.states = states;
+  now_.states.branches = branches;
   start_W_.clear();
   for (const Pose& X_WB : states.X_WB) start_W_.push_back(X_WB.translation());
   now_.work.setZero(dynamics_.works());
@@ -185,6 +196,7 @@ RunSummary FreeMotion::Start(const BodyStates& states) {
   if (summary.ok() && !friction_elements_.empty()) summary = BeginFriction();
   if (summary.ok() && !ends_.empty()) summary = StartStops();
   if (!summary.ok()) return summary;
+  if (has_branches()) summary = TakeBranches(BranchesAt(Pack(now_), 0.0));
   NoteFriction();
   NoteCorners();
   return summary;
@@ -196,6 +208,7 @@ void FreeMotion::Rates(const State& x, State* rates, double t_s) {
   ++evaluations_;
   work_states_.coupled = now_.states.coupled;
   work_states_.turns = now_.states.turns;
+  work_states_.branches = now_.states.branches;
   Unpack(x, &work_states_, nullptr);
   t_s = time_(t_s);
   trouble_ = Accelerate(t_s, &work_states_);
@@ -239,6 +252,7 @@ VecX FreeMotion::LoadsAfter(double h) {
   const double t_s = now_.time_s + h;
   BodyStates states = StatesOf(StepFrom(Pack(now_), h));
   states.turns = now_.states.turns;
+  states.branches.clear();
   CommandSample at;
   EvaluateMotion(motion_, t_s, &at);
   const auto of_loads = 6 * static_cast<Eigen::Index>(at.loads.size());
@@ -405,7 +419,17 @@ RunSummary FreeMotion::Segment(double to_s) {
       return NoWayOn(dt_);
     }
     dt_ = clipped ? std::max(natural, dt) : dt;
-    const double corner = corner_elements_.empty() ? tried : TimeToCorner(tried, x);
+    BranchEnd branch{.after_s = tried};
+    if (has_branches()) branch = TimeToBranch(tried, x);
+    if (branch.after_s == 0.0) {  // left at once, for good or back and forth
+      if (++branched_here_ > kMostBranched) return NoWayOn(tried);
+      if (RunSummary summary = TakeBranches(branch.next); !summary.ok()) return summary;
+      continue;
+    }
+    if (branch.after_s < tried) x = StepFrom(Pack(now_), branch.after_s);
+    const double corner =
+        corner_elements_.empty() ? branch.after_s : TimeToCorner(branch.after_s, x);
+    const bool leaves_branch = branch.after_s < tried && corner == branch.after_s;
     if (corner < tried) {
       x = StepFrom(Pack(now_), corner);
       if (!trouble_.ok()) return trouble_;
@@ -425,6 +449,10 @@ RunSummary FreeMotion::Segment(double to_s) {
       accepted_at = impact->hits.empty() ? LetGo(impact->leaves) : Strike(impact->hits);
     }
     if (!accepted_at.ok()) return accepted_at;
+    branched_here_ = 0;
+    if (leaves_branch && now_.time_s == t) {
+      if (RunSummary summary = TakeBranches(branch.next); !summary.ok()) return summary;
+    }
     NoteFriction();
     NoteCorners();
     if (tried < kSmallestStepShare * duration_s_ && !to_the_end) return NoWayOn(tried);
@@ -440,6 +468,55 @@ std::vector<int> FreeMotion::PiecesAt(const State& x) const {
     pieces.push_back(PieceOf(mechanism_.elements[e], row.value, RateOf(row, states.V_WB)));
   }
   return pieces;
+}
+
+std::vector<int> FreeMotion::BranchesAt(const State& x, double t_s) const {
+  std::vector<int> branches(now_.states.branches.size(), kAnyBranch);
+  if (branches.empty()) return branches;
+  const BodyStates states = StatesOf(x);
+  for (const size_t e : branch_elements_) {
+    const ScalarRow row = ElementRow(mechanism_, e, states);
+    branches[e] = PieceOf(mechanism_.elements[e], row.value, RateOf(row, states.V_WB));
+  }
+  for (const auto& [path, function] : branching_) {
+    branches[mechanism_.elements.size() + static_cast<size_t>(function->number)] =
+        function->branch(time_(t_s), InputsOf(mechanism_, states, *function));
+  }
+  return branches;
+}
+
+FreeMotion::BranchEnd FreeMotion::TimeToBranch(double h, const State& to) {
+  const std::vector<int>& now = now_.states.branches;
+  BranchEnd end{.after_s = h, .next = BranchesAt(to, now_.time_s + h)};
+  if (end.next == now) return end;
+  const State from = Pack(now_);
+  double before = 0.0;
+  while (end.after_s - before > kCornerShare * h) {
+    const double t = 0.5 * (before + end.after_s);
+    std::vector<int> at = BranchesAt(StepFrom(from, t), now_.time_s + t);
+    if (!std::exchange(trouble_, RunSummary::Done()).ok()) return {.after_s = h, .next = now};
+    if (at == now) {
+      before = t;
+    } else {
+      end = {.after_s = t, .next = std::move(at)};
+    }
+  }
+  if (before == 0.0) end.after_s = 0.0;
+  return end;
+}
+
+// Forces may jump.
+RunSummary FreeMotion::TakeBranches(std::vector<int> branches) {
+  now_.states.branches = std::move(branches);
+  nodes_.clear();
+  for (const size_t e : branch_elements_) {
+    log_.Note(mechanism_.elements[e], now_.time_s, Happening::kBranch, now_.states.branches[e]);
+  }
+  for (const auto& [path, function] : branching_) {
+    const size_t at = mechanism_.elements.size() + static_cast<size_t>(function->number);
+    log_.Note(path, now_.time_s, Happening::kBranch, now_.states.branches[at]);
+  }
+  return in_touch_.empty() ? RunSummary::Done() : KeepInTouch(in_touch_);
 }
 
 // At a dead centre friction neither rests nor slides: it goes on as before.
@@ -544,9 +621,11 @@ std::vector<Yielding> YieldingParts(const Mechanism& mechanism, const BodyStates
     parts.push_back({spring.name, Along(row, motions), spring.stiffness, spring.damping});
   }
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
+  const double length = CharacteristicLength(mechanism);
   for (size_t e = 0; e < rows.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
-    const ElementSlope slope = SlopeOf(element, rows[e].value);
+    const double unit = ActsOnLength(mechanism, element) ? length : 1.0;
+    const ElementSlope slope = SlopeOf(element, rows[e].value, unit);
     if (slope.stiffness == 0.0 && slope.damping == 0.0) continue;
     parts.push_back({element.name, Along(rows[e], motions), slope.stiffness, slope.damping});
   }

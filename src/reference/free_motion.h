@@ -91,6 +91,19 @@ class FreeMotion {
   [[nodiscard]] RunSummary Accept(const State& x, double t_s);
   /// Of the laws with corners (PieceOf()), in the order of corner_elements_.
   [[nodiscard]] std::vector<int> PiecesAt(const State& x) const;
+  // Expressions are taken by the branch on which a step begins, until they leave it.
+  [[nodiscard]] bool has_branches() const {
+    return !branch_elements_.empty() || !branching_.empty();
+  }
+  /// As BodyStates::branches, of those that hold there.
+  [[nodiscard]] std::vector<int> BranchesAt(const State& x, double t_s) const;
+  /// The time just beyond which another branch holds; h where none does.
+  struct BranchEnd {
+    double after_s = 0.0;
+    std::vector<int> next = {};
+  };
+  [[nodiscard]] BranchEnd TimeToBranch(double h, const State& to);
+  [[nodiscard]] RunSummary TakeBranches(std::vector<int> branches);
   [[nodiscard]] double TimeToCorner(double h, const State& to);
   void NoteFriction();
   void NoteCorners();
@@ -207,12 +220,14 @@ class FreeMotion {
   std::vector<size_t> friction_elements_;  ///< with dry friction that is not switched off
   std::vector<size_t> all_friction_;       ///< with those that are
   std::vector<size_t> off_;
-  std::vector<size_t> corner_elements_;
+  std::vector<size_t> corner_elements_, branch_elements_;
+  const std::vector<BranchingFunction> branching_;
   std::vector<char> fresh_;           ///< per element: slides since this very time
   std::vector<End> ends_, in_touch_;  ///< of rigid stops; in touch: by increasing elements
   int impacts_here_ = 0;              ///< since the last sample
   EventLog log_;
   int settled_here_ = 0;  ///< how often friction was decided at this very time
+  int branched_here_ = 0;  ///< how often branches were left at this very time
 };
 
 // How fast springs, dampers and force elements let a mechanism vibrate or creep, and what following

@@ -30,7 +30,7 @@ std::vector<const SourceModelCause*> SourceModelAudit::Culprits() const {
 }
 
 std::string SourceModelSentence(const SourceModelAudit& audit) {
-  if (!audit.declined.empty()) return "the source model was not run: " + audit.declined;
+  if (!audit.not_run.empty()) return "the source model was not run: " + audit.not_run;
   const SourceModelError& e = audit.as_is;
   if (!e.sound()) {
     return fmt::format("with its own settings your file gives no forces that could be compared: {}",
@@ -84,8 +84,8 @@ Json ErrorJson(const SourceModelError& e) {
 
 nlohmann::ordered_json SourceModelJson(const SourceModelAudit& audit) {
   Json json = {{"file", audit.file}, {"sentence", SourceModelSentence(audit)}};
-  if (!audit.declined.empty()) {
-    json["declined"] = audit.declined;
+  if (!audit.not_run.empty()) {
+    json["declined"] = audit.not_run;
     return json;
   }
   json["good"] = audit.Good(audit.as_is);
@@ -354,7 +354,7 @@ Table TrialTable(const SourceModelAudit& audit, bool all) {
 ReportSection SourceModelSection(const SourceModelAudit& audit, bool verbose) {
   ReportSection section{.title = "Your source file, run as it is", .link = "File"};
   section.Add(Paragraph{Sentence(SourceModelSentence(audit)), Paragraph::Look::kReason});
-  if (!audit.declined.empty()) return section;
+  if (!audit.not_run.empty()) return section;
   section.Add(Items{MeasuredLines(audit)});
   section.Add(Items{audit.notes});
   section.Add(Fold{"How it was run", {{Items{{SettingsLine(audit)}}}, {Items{audit.done}}}});

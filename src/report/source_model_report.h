@@ -53,7 +53,7 @@ struct SourceModelTrial {
 
 struct SourceModelAudit {
   std::string file;
-  std::string declined;  ///< why it could not be run; "" if it was
+  std::string not_run;  ///< why it could not be run; "" if it was
   // What the file says.
   double step_s = kNan, duration_s = kNan;
   std::string integrator, solver;

@@ -317,8 +317,9 @@ bool CanFollow(const Mechanism& mechanism, const Coordinate& coordinate) {
 
 class FunctionReader {
  public:
-  FunctionReader(ValueReader* values, const Mechanism& mechanism)
-      : values_(*values), mechanism_(mechanism) {
+  FunctionReader(ValueReader* values, const Mechanism& mechanism,
+                 const std::map<std::string, Profile>& signals)
+      : values_(*values), mechanism_(mechanism), signals_(signals) {
     for (const NamedCoordinate& named : StateCoordinates(mechanism)) {
       if (!CanFollow(mechanism, named.coordinate)) continue;
       known_.push_back({named.name + ".position", Input(named.coordinate, false)});
@@ -331,18 +332,41 @@ class FunctionReader {
     bool good = true;
     for (const Piece& piece : PiecesOf(node.text)) {
       good = CheckTime(piece, node, path) && good;
+      const auto signal = piece.is_word ? signals_.find(piece.text) : signals_.end();
+      if (signal != signals_.end()) {
+        used_.push_back(signal->second);
+        used_names_.push_back(fmt::format("signal_{}", used_.size()));
+        expression += used_names_.back();
+        continue;
+      }
       const auto name = piece.is_dotted() ? VariableOf(piece.text, node, path) : piece.text;
       good = good && name;
       expression += name.value_or("0");
     }
     if (!good) return std::nullopt;
-    const auto formula = values_.Compile(node, path, expression, variables_);
+    std::vector<std::string> names = variables_;
+    names.insert(names.end(), used_names_.begin(), used_names_.end());
+    const auto formula = values_.Compile(node, path, expression, names);
     if (formula == nullptr) return std::nullopt;
-    return StateFunction{.inputs = inputs_, .value = [formula](double t_s, auto inputs) {
-                           std::vector<double> all{t_s};
-                           all.insert(all.end(), inputs.begin(), inputs.end());
-                           return formula->At(all);
-                         }};
+    const auto known = [signals = used_](double t_s, std::span<const double> inputs) {
+      std::vector<double> all{t_s};
+      all.insert(all.end(), inputs.begin(), inputs.end());
+      for (const Profile& signal : signals) all.push_back(Evaluate(signal, t_s).value);
+      return all;
+    };
+    StateFunction function{.inputs = inputs_,
+                           .value = [formula, known](double t_s, std::span<const double> inputs) {
+                             return formula->At(known(t_s, inputs));
+                           },
+                           .signals = used_};
+    if (!formula->has_branches()) return function;
+    function.branch = [formula, known](double t_s, std::span<const double> inputs) {
+      return formula->BranchAt(known(t_s, inputs));
+    };
+    function.on_branch = [formula, known](int branch, double t_s, std::span<const double> inputs) {
+      return formula->OnBranch(branch, known(t_s, inputs));
+    };
+    return function;
   }
 
  private:
@@ -384,14 +408,17 @@ class FunctionReader {
   ValueReader& values_;
   const Mechanism& mechanism_;
   std::vector<Known> known_;
+  const std::map<std::string, Profile>& signals_;
   std::vector<StateFunction::Input> inputs_;
   std::vector<std::string> variables_ = {kTime};
+  std::vector<Profile> used_;
+  std::vector<std::string> used_names_;
 };
 
 }  // namespace
 
 StateFunctions::StateFunctions(ValueReader* values, const Mechanism& mechanism,
-                               const YamlNode* variables)
+                               const YamlNode* variables, ProfileTables* tables)
     : values_(*values), mechanism_(mechanism) {
   if (variables == nullptr) return;
   YamlReader& yaml = values->yaml();
@@ -402,12 +429,16 @@ StateFunctions::StateFunctions(ValueReader* values, const Mechanism& mechanism,
     if (values->HasParameter(entry.key)) why_not = "it is a parameter of " + mechanism.name;
     if (!why_not.empty()) {
       yaml.Error(entry, fmt::format("{}: {}", path, why_not));
+    } else if (!entry.value->is_scalar()) {
+      const ProfileContext context{
+          .unit = "", .home = {}, .name = path, .may_jump = true, .tables = tables};
+      signals_[entry.key] = ReadProfile(values, *entry.value, path, context);
     } else if (const auto text = yaml.Text(*entry.value, path)) {
       variables_[entry.key] = *text;
     }
   }
   for (const YamlEntry& entry : yaml.Entries(*variables, "variables")) {
-    if (!yaml.has_errors()) (void)Read(*entry.value, "variables." + entry.key);
+    if (entry.value->is_scalar() && !yaml.has_errors()) (void)Read(*entry.value, "variables." + entry.key);
   }
 }
 
@@ -416,7 +447,8 @@ bool StateFunctions::Follows(const YamlNode& node) const {
   const std::vector<Piece> pieces = PiecesOf(node.text);
   return std::ranges::any_of(pieces, [&](const Piece& piece) {
     return piece.is_dotted() || (piece.text == kTime && !values_.HasParameter(kTime)) ||
-           (piece.is_word && variables_.contains(piece.text));
+           (piece.is_word &&
+            (variables_.contains(piece.text) || signals_.contains(piece.text)));
   });
 }
 
@@ -452,7 +484,9 @@ std::optional<StateFunction> StateFunctions::Read(const YamlNode& node, const st
   if (!text) return std::nullopt;
   YamlNode expanded = node;
   expanded.text = *text;
-  return FunctionReader(&values_, mechanism_).Read(expanded, path);
+  auto function = FunctionReader(&values_, mechanism_, signals_).Read(expanded, path);
+  if (function && function->branch) function->number = branching_++;
+  return function;
 }
 
 namespace {
@@ -472,7 +506,7 @@ class MotionReader {
 
   Motion Read(const MotionSections& sections) {
     const YamlNode *node = sections.motion, *forces = sections.forces;
-    functions_.emplace(values_, mechanism_, sections.variables);
+    functions_.emplace(values_, mechanism_, sections.variables, &tables_);
     YamlMap map(&yaml(), node, "motion",
                 {"duration_s", "sample_s", "commands", "equal", "path", "pose_table", "initial",
                  "initial_rates"});

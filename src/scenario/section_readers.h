@@ -16,6 +16,8 @@
 
 namespace mbv {
 
+struct ProfileTables;
+
 // Keys of `motion.path` with `blend`: polylines with rounded corners.
 
 /// Everything but the points; empty after a finding.
@@ -31,11 +33,13 @@ namespace mbv {
 // Names with dots are coordinates (StateCoordinates()) with .position or .velocity behind, t is the
 // time [s]; other names are parameters, which are constants. SI units, radians.
 
-/// Reads them, with the names that a scenario gives to parts of them (`variables`).
+/// Reads them, with the names that a scenario gives to parts of them and to time profiles
+/// (`variables`).
 class StateFunctions {
  public:
-  /// `variables` may be null.
-  StateFunctions(ValueReader* values, const Mechanism& mechanism, const YamlNode* variables);
+  /// `variables` may be null; `tables` are those that profiles name.
+  StateFunctions(ValueReader* values, const Mechanism& mechanism, const YamlNode* variables,
+                 ProfileTables* tables);
 
   /// True for a text that names the time, a coordinate or a variable.
   [[nodiscard]] bool Follows(const YamlNode& node) const;
@@ -48,6 +52,8 @@ class StateFunctions {
   ValueReader& values_;
   const Mechanism& mechanism_;
   std::map<std::string, std::string> variables_;
+  std::map<std::string, Profile> signals_;
+  int branching_ = 0;  ///< functions with branches so far
 };
 
 /// Times for a motion that states none, from a table that it is compared with.

@@ -157,12 +157,12 @@ class ForeignRunner {
     record_.foreign->program =
         QuotedValue(answer->program) +
         (answer->version.empty() ? "" : " " + QuotedValue(answer->version, kMostVersion));
-    for (const auto& [what, why] : answer->declined) {
-      record_.foreign->declined.emplace_back(QuotedValue(what), QuotedValue(why, kMostReason));
+    for (const auto& [what, why] : answer->left_out) {
+      record_.foreign->left_out.emplace_back(QuotedValue(what), QuotedValue(why, kMostReason));
     }
     record_.foreign->compute_s = answer->compute_s;
     if (!answer->refused.empty()) {
-      return ProgramFailure{WitnessGap::kDeclined,
+      return ProgramFailure{WitnessGap::kOutOfScope,
                             "not applicable: " + QuotedValue(answer->refused, kMostReason)};
     }
     const auto csv = call_.Text("traces.csv");

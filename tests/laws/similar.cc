@@ -129,9 +129,14 @@ void Scale(const Mechanism& mechanism, double s, ForceElement* element) {
     for (double& rate : curves->rates) rate *= unit;
   }
   if (auto* expression = std::get_if<ExpressionLaw>(&element->law)) {
-    expression->force = [=, at = expression->force](double x, double v) {
-      return force * at(x / unit, v / unit);
-    };
+    const ExpressionLaw of = *expression;
+    expression->force = [=](double x, double v) { return force * of.force(x / unit, v / unit); };
+    if (of.branch) {
+      expression->branch = [=](double x, double v) { return of.branch(x / unit, v / unit); };
+      expression->on_branch = [=](int branch, double x, double v) {
+        return force * of.on_branch(branch, x / unit, v / unit);
+      };
+    }
   }
   if (auto* rotor = std::get_if<RotorLaw>(&element->law)) rotor->inertia *= force / unit;
   auto* spring = std::get_if<SpringLaw>(&element->law);
@@ -151,11 +156,22 @@ StateFunction Scaled(const Mechanism& mechanism, const StateFunction& function, 
     units.push_back(IsLength(mechanism, input.coordinate) ? s : 1.0);
     input.near *= units.back();
   }
-  out.value = [=, value = function.value](double t_s, std::span<const double> inputs) {
-    std::vector<double> original(inputs.begin(), inputs.end());
-    for (size_t i = 0; i < original.size(); ++i) original[i] /= units[i];
-    return by * value(t_s, original);
+  const auto original = [units](std::span<const double> inputs) {
+    std::vector<double> values(inputs.begin(), inputs.end());
+    for (size_t i = 0; i < values.size(); ++i) values[i] /= units[i];
+    return values;
   };
+  out.value = [=](double t_s, std::span<const double> inputs) {
+    return by * function.value(t_s, original(inputs));
+  };
+  if (function.branch) {
+    out.branch = [=](double t_s, std::span<const double> inputs) {
+      return function.branch(t_s, original(inputs));
+    };
+    out.on_branch = [=](int branch, double t_s, std::span<const double> inputs) {
+      return by * function.on_branch(branch, t_s, original(inputs));
+    };
+  }
   return out;
 }
 

@@ -142,6 +142,42 @@ struct RatchetedBlock {
   }
 };
 
+/// A block that brakes harder beyond a place than before it: it flies on, turns round and comes
+/// back. The force jumps at that place, by an expression of two branches.
+struct JumpingForce {
+  static constexpr double mass = 2.0, place = 0.2, v0 = 1.5, before = 2.0;
+  double beyond = 20.0;
+
+  [[nodiscard]] ExpressionLaw Law() const {
+    const auto on_branch = [far = beyond](int branch, double, double) {
+      return branch == 0 ? -before : -far;
+    };
+    const auto branch = [](double x, double) { return x < place ? 0 : 1; };
+    return {.text = "x < 0.2 ? -2 : -20",
+            .force = [=](double x, double v) { return on_branch(branch(x, v), x, v); },
+            .branch = branch,
+            .on_branch = on_branch};
+  }
+  [[nodiscard]] static double passes() {  ///< [s]
+    const double a = before / mass;
+    return (v0 - std::sqrt(v0 * v0 - 2.0 * a * place)) / a;
+  }
+  /// A block alone returns where it passed with the opposite rate.
+  [[nodiscard]] double returns() const {
+    return passes() + 2.0 * (v0 - before / mass * passes()) / (beyond / mass);
+  }
+  [[nodiscard]] double Position(double t) const {
+    const double a = before / mass, v = v0 - a * passes();
+    if (t < passes()) return v0 * t - 0.5 * a * t * t;
+    if (t < returns()) {
+      const double since = t - passes();
+      return place + v * since - 0.5 * beyond / mass * since * since;
+    }
+    const double since = t - returns();
+    return place - v * since - 0.5 * a * since * since;
+  }
+};
+
 inline FrictionLaw CoulombFriction(double force) { return {.coulomb = force, .breakaway = force}; }
 /// `breakaway` at rest, `coulomb` as soon as it slides.
 inline FrictionLaw JumpingFriction(double coulomb, double breakaway) {

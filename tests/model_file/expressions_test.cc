@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
 
 namespace mbv {
 namespace {
@@ -185,6 +190,81 @@ TEST(Expressions, AFailedOuterParameterIsSilentInside) {
   EXPECT_FALSE(result.value);
   EXPECT_EQ(result.error, "");
   EXPECT_EQ(outer.Lookup("a").error, "gives inf, a finite number is needed");
+}
+
+// Of everything that decides, alone and within each other: on its own branch an expression is
+// itself, and on a branch that is held it has neither corner nor jump.
+TEST(ExpressionBranches, AreTheExpressionWhereTheyHold) {
+  Scope scope;
+  scope.Define("a", "0.3");
+  const std::vector<std::string> texts = {
+      "abs(x)",
+      "abs (x - a) + v",
+      "sign(x)*v",
+      "min(x, v)",
+      "max(0, x - a, v)",
+      "rint(4*x)",
+      "x < a ? 1 : 2",
+      "x <= v ? x : -v^2",
+      "x > a",
+      "x >= a && v < 0 ? 3 : v > a || x < -a ? 4 : x",
+      "x == 2 ? 1 : 0",
+      "x != v",
+      "2*(x > -1) - 0.03*v",
+      "-5*(x - abs(min(x, a))) + (v < 0 ? sqrt(-v) : v*abs(v))",
+      "max(abs(x) - a, 0)*(1 + sign(v - (x > 0 ? a : -a)))",
+      "(x + (v < x ? a : 1))*2",
+  };
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> pick(-2.0, 2.0);
+  for (const std::string& text : texts) {
+    const FormulaResult compiled = scope.Compile(text, {"x", "v"});
+    ASSERT_NE(compiled.formula, nullptr) << text << ": " << compiled.error;
+    const Formula& formula = *compiled.formula;
+    EXPECT_TRUE(formula.has_branches()) << text;
+    std::set<int> branches;
+    for (int i = 0; i < 300; ++i) {
+      const std::array at = {pick(random), pick(random)};
+      const int branch = formula.BranchAt(at);
+      branches.insert(branch);
+      EXPECT_EQ(formula.OnBranch(branch, at), formula.At(at)) << text;
+      // Second differences of what is smooth; at a corner of slope 1 they are 1 per step.
+      constexpr double h = 1e-3;
+      const auto along = [&](double s) {
+        return formula.OnBranch(branch, std::array{at[0] + s, at[1] + 0.7 * s});
+      };
+      for (double s = -1.0; s < 1.0; s += 0.01) {
+        if (std::abs(at[1] + 0.7 * s) < 0.05) continue;  // of the root
+        const double second = along(s + h) - 2.0 * along(s) + along(s - h);
+        if (formula.BranchAt(std::array{at[0] + s, at[1] + 0.7 * s}) != branch &&
+            text.find("sqrt") != std::string::npos) {
+          continue;  // a root of a negative number gives way to the branch that holds
+        }
+        EXPECT_LT(std::abs(second), 1e-4) << text << " at " << s;
+      }
+    }
+    if (text.find("==") == std::string::npos && text.find("!=") == std::string::npos) {
+      EXPECT_GT(branches.size(), 1u) << text;
+    }
+  }
+}
+
+TEST(ExpressionBranches, OfConstantsAreNone) {
+  Scope scope;
+  scope.Define("a", "0.3");
+  for (const char* text : {"abs(a)*x", "a > 0 ? x : v", "max(a, 1)*sin(x)", "x^2 + v"}) {
+    const FormulaResult compiled = scope.Compile(text, {"x", "v"});
+    ASSERT_NE(compiled.formula, nullptr) << text << ": " << compiled.error;
+    EXPECT_FALSE(compiled.formula->has_branches()) << text;
+  }
+}
+
+TEST(ExpressionBranches, AreNotEndless) {
+  std::string text = "0";
+  for (int i = 0; i < 40; ++i) text += "+abs(x-" + std::to_string(i) + ")";
+  Scope scope;
+  EXPECT_EQ(scope.Compile(text, {"x"}).error,
+            "is not an expression: it decides between too many branches");
 }
 
 TEST(Expressions, ParameterNamesAreWordsWithoutAMeaningOfTheirOwn) {

@@ -148,6 +148,22 @@ TEST(PiecewiseElements, CurvesAtRatesAndExpressionsAreTheSpringAndDamperThatThey
   EXPECT_LT((balance.array() - balance[0]).abs().maxCoeff(), kTracked * balance[0]);
 }
 
+// Force and acceleration jump; events have the closed form's times.
+TEST(PiecewiseElements, AnExpressionThatJumpsIsFollowedAcross) {
+  const JumpingForce law;
+  const auto position = [&](double t) { return law.Position(t); };
+  const ForwardRun run = Free(BlockOn(law.Law()));
+  EXPECT_LT(FarthestFrom(run, position), 1e-12);
+  ASSERT_EQ(run.trace.events.size(), 2u);
+  EXPECT_EQ(run.trace.events[0].what, Happening::kBranch);
+  EXPECT_NEAR(run.trace.events[0].time_s, law.passes(), 1e-11);
+  EXPECT_NEAR(run.trace.events[1].time_s, law.returns(), 1e-11);
+  const VecX balance = ColumnOf(run.trace, "energy.kinetic") - ColumnOf(run.trace, "dampers.work");
+  EXPECT_LT((balance.array() - balance[0]).abs().maxCoeff(), 1e-11 * balance[0]);
+  const JumpingForce wrong{.beyond = law.beyond * (1 + 1e-7)};
+  EXPECT_GT(FarthestFrom(Free(BlockOn(wrong.Law())), position), 1e-9);
+}
+
 TEST(PiecewiseElements, AnExpressionWithoutValueEndsTheRunByItsName) {
   const ExpressionLaw law{.text = "sqrt(0.1 - x)",
                           .force = [](double x, double) { return std::sqrt(0.1 - x); }};

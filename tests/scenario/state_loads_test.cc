@@ -1,11 +1,15 @@
 // Loads as expressions in scenario files.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "scenario/load_scenario.h"
 #include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {
@@ -85,6 +89,38 @@ TEST(StateFunctions, MayNameTheirParts) {
   EXPECT_NE(findings("{t: 1}", "t").find("variables.t: t is the time"), std::string::npos);
   EXPECT_NE(findings("{crank: 1}", "t").find("is a parameter"), std::string::npos);
   EXPECT_NE(findings("{a: moter.position}", "a").find("did you mean 'motor.position'"),
+            std::string::npos);
+}
+
+TEST(StateFunctions, KnowSignalsOfTheTimeAndTheirJumps) {
+  const test::TestFolder folder("signals");
+  folder.Write("wind.csv", "t,v\n0,1\n0.25,2\n0.5,4\n0.75,3\n1,1\n");
+  const auto with = [&](const std::string& variables, const std::string& moment) {
+    const std::string text = std::string("mechanism: ") + kSourceDir +
+                             "/models/four_bar/model.yaml\n"
+                             "motion: {duration_s: 1, sample_s: 0.01, commands: {motor: home}}\n"
+                             "variables: " +
+                             variables + "\nloads: {l: {on: crank, moment: [0, 0, \"" + moment +
+                             "\"]}}\nanalytic: none\n";
+    return LoadScenario(folder.Write("s.yaml", text));
+  };
+  const ScenarioResult result =
+      with("{wind: {table: {csv: wind.csv, column: v}}, gust: [0.5, {step: {height: 2, at_s: 0.4}}],"
+           " both: wind + gust}",
+           "-both*motor.velocity - (wind > 3.5)");
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const Motion& motion = result.scenario->motion;
+  const StateFunction& f = motion.loads.at(0).following.at(0).function;
+  const auto value = [&](double t) { return f.value(t, std::vector<double>{2.0}); };
+  EXPECT_NEAR(value(0.25), -2.0 * (2.0 + 0.5), 1e-12);
+  EXPECT_NEAR(value(0.5), -2.0 * (4.0 + 2.5) - 1.0, 1e-12);
+  EXPECT_NEAR(value(0.75), -2.0 * (3.0 + 2.5), 1e-12);
+  const std::vector<double> jumps = JumpTimes(motion);
+  EXPECT_NE(std::ranges::find(jumps, 0.4), jumps.end());
+  EXPECT_NE(f.branch(0.5, std::vector<double>{2.0}), f.branch(0.25, std::vector<double>{2.0}));
+  EXPECT_EQ(BranchingFunctions(*result.mechanism, motion).at(0).path, "loads.l.moment[2]");
+  EXPECT_NE(with("{a: {sinus: 1}}", "a").diagnostics.Text().find("variables.a"), std::string::npos);
+  EXPECT_NE(with("{a: {table: {csv: none.csv, column: v}}}", "a").diagnostics.Text().find("none.csv"),
             std::string::npos);
 }
 

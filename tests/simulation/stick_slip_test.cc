@@ -216,6 +216,30 @@ TEST(SimulatedPieces, CurvesAtRatesAndExpressionsAreTheSpringAndDamperThatTheyDe
   }
 }
 
+TEST(SimulatedPieces, AnExpressionThatJumpsIsFollowedAcross) {
+  const fixtures::JumpingForce law;
+  Mechanism m = StackedBlocks{{law.mass}, {CoulombFriction(0.0)}}.Make();
+  const auto run_of = [&](const fixtures::JumpingForce& of) {
+    m.elements[0].law = of.Law();
+    const SimulationRun run = SlipFreely(m, StackedBlocks::From(m, 0.0, law.v0, 0.6), 1e-3);
+    EXPECT_TRUE(run.summary.ok()) << run.summary.message;
+    return run;
+  };
+  const auto position = [&](double t) { return law.Position(t); };
+  const SimulationRun run = run_of(law);
+  EXPECT_LT(Farthest(run.trace, "motor1.position", position), 1e-12);
+  ASSERT_EQ(run.trace.events.size(), 2u);
+  EXPECT_NEAR(run.trace.events[0].time_s, law.passes(), 1e-12);
+  EXPECT_NEAR(run.trace.events[1].time_s, law.returns(), 1e-12);
+  const auto last = run.trace.values.rows() - 1;
+  const double v = run.trace.values(last, run.trace.Find("motor1.velocity"));
+  EXPECT_NEAR(run.trace.values(last, run.trace.Find("dampers.work")),
+              0.5 * law.mass * (v * v - law.v0 * law.v0), 1e-11);
+  EXPECT_GT(
+      Farthest(run_of({.beyond = law.beyond * (1.0 + 1e-7)}).trace, "motor1.position", position),
+      1e-9);
+}
+
 TEST(SimulatedRigidStops, ABlockBouncesAsItsClosedFormAndRests) {
   const BouncingBlock block;
   Mechanism m = block.Make();

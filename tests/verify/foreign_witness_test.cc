@@ -229,7 +229,7 @@ INSTANTIATE_TEST_SUITE_P(
                  WitnessGap::kBadAnswer},
         Mischief{"twice", "traces.csv has two columns 'motor.velocity'", WitnessGap::kBadAnswer},
         Mischief{"foot", "units is 'foot, pound'", WitnessGap::kBadAnswer},
-        Mischief{"refuses", "not applicable: it has a loop", WitnessGap::kDeclined},
+        Mischief{"refuses", "not applicable: it has a loop", WitnessGap::kOutOfScope},
         Mischief{"schema", "schema is 'mbverify/witness/0'", WitnessGap::kBadAnswer},
         Mischief{"link", "left no traces.csv", WitnessGap::kNoAnswer},
         Mischief{"listed", "witness.json", WitnessGap::kBadAnswer},
@@ -311,10 +311,10 @@ TEST(AnalyticWitness, ThatIsNotApplicableIsACaveatAndMayBeRequired) {
     if (!analytic.empty()) options.scenario.set = {{"analytic", analytic}};
     return RunScenario(SourcePath("/scenarios/" + scenario + ".yaml"), options);
   };
-  const RunOutcome declined = run("spr_tripod/other_azimuth", "");
-  ASSERT_TRUE(declined.report) << declined.diagnostics.Text();
-  EXPECT_EQ(declined.report->comparison.verdict, Verdict::kAgree);
-  ExpectCaveat(declined, "analytic", WitnessGap::kNotApplicable);
+  const RunOutcome other = run("spr_tripod/other_azimuth", "");
+  ASSERT_TRUE(other.report) << other.diagnostics.Text();
+  EXPECT_EQ(other.report->comparison.verdict, Verdict::kAgree);
+  ExpectCaveat(other, "analytic", WitnessGap::kNotApplicable);
   EXPECT_EQ(run("spr_tripod/other_azimuth", "{required: true}").exit_code, 3);
   EXPECT_EQ(MissingIn(run("spr_tripod/other_azimuth", "none")), nullptr);
   // A four-bar has no closed form: not a caveat unless the scenario counts on one.
@@ -428,7 +428,7 @@ TEST(ForeignWitness, SimbodyMovesFreely) {
 }
 
 // What it does not know is not applicable, and the verdict is that of the others.
-TEST(ForeignWitness, SimbodyDeclinesFriction) {
+TEST(ForeignWitness, FrictionIsNotApplicableToSimbody) {
   RunOptions options;
   options.pictures = false;
   options.scenario.set = {Simbody()};

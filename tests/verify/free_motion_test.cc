@@ -177,16 +177,20 @@ TEST(FreeMotionVerdicts, SamplesThatAMotionTurnsTooFarBetweenJudgeNoRates) {
   EXPECT_THAT(fast.attribution.text, Not(HasSubstr("not the time derivatives")));
 }
 
-// No step of the reference is small enough where a moment jumps by an angle, by time or by the sign
-// of a rate: no verdict rather than a wrong motion, and it says what jumps.
-TEST(FreeMotionVerdicts, ALoadThatJumpsIsNamed) {
-  const Comparison by_angle = RunBar("2*(motor.position > -1) - 0.03*motor.velocity");
-  EXPECT_EQ(by_angle.verdict, Verdict::kNotRun);
-  EXPECT_THAT(by_angle.reason, HasSubstr("loads.stop.moment[2] jumps from 2"));
-  const Comparison by_time = RunBar("0.5*(t > 1.23456) + 0*motor.velocity");
-  EXPECT_EQ(by_time.verdict, Verdict::kNotRun);
-  EXPECT_THAT(by_time.reason,
-              HasSubstr("loads.stop.moment[2] jumps from 0 to 0.5 N m at t = 1.23456 s"));
+// Where a moment jumps by an angle or by time, steps end; what decides is of the moment alone.
+TEST(FreeMotionVerdicts, ALoadThatJumpsIsFollowedAcross) {
+  for (const char* moment :
+       {"2*(motor.position > -1) - 0.03*motor.velocity", "0.5*(t > 1.23456) + 0*motor.velocity",
+        "-0.3*abs(motor.position + 0.2)", "max(-1, -3*motor.position)",
+        "motor.position < -1 ? -2 - 0.1*motor.velocity : 0.3*min(t, 1)"}) {
+    const Comparison jumps = RunBar(moment);
+    EXPECT_EQ(jumps.verdict, Verdict::kAgree) << moment << ": " << TextOf(jumps);
+  }
+}
+
+// Both branches push the bar back: no step of the reference is small enough. No verdict rather than
+// a wrong motion, and it says what jumps.
+TEST(FreeMotionVerdicts, ALoadThatJumpsBackAndForthIsNamed) {
   const Comparison by_rate = RunBar("1 - 2*(motor.velocity > 0)");
   EXPECT_EQ(by_rate.verdict, Verdict::kNotRun);
   EXPECT_THAT(by_rate.reason, HasSubstr("loads.stop.moment[2] jumps from"));

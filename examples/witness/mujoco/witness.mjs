@@ -11,7 +11,7 @@ const METHODS = {
   inverse: 'mj_inverse; loops closed by MuJoCo\'s Jacobians, nothing is soft',
   defaults: 'mj_step; equalities of MuJoCo\'s default softness, positions as the drives\' targets',
 };
-const DECLINED = [{what: 'joint reactions', why: 'only drives, outputs and loops are read out'}];
+const LEFT_OUT = [{what: 'joint reactions', why: 'only drives, outputs and loops are read out'}];
 
 // Friction that the joint's load does not raise, of a hinge or slide.
 const isDry = ({law, on}) => law.coulomb !== undefined && law.coefficient === 0 && law.resists === undefined && on.joint !== undefined && on.coordinate === 0;
@@ -123,5 +123,5 @@ export function witness(engine, method) {
     ...named(outputs.map((output) => output.name), ['x', 'y', 'z', 'roll', 'pitch', 'yaw']),
   ];
   fs.writeFileSync('traces.csv', [['time_s', ...columns, 'closure.position'].join(','), ...lines, ''].join('\n'));
-  return {method: METHODS[method], compute_s, declined: DECLINED};
+  return {method: METHODS[method], compute_s, declined: LEFT_OUT};
 }

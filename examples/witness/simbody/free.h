@@ -1,5 +1,5 @@
 // A free motion: it starts from start.csv and is integrated by Simbody's Runge–Kutta–Merson method,
-// drives pushing as forces.csv says. With commanded coordinates beside it is declined.
+// drives pushing as forces.csv says. With commanded coordinates in addition it is not applicable.
 #pragma once
 
 #include "model.h"

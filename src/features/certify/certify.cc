@@ -965,6 +965,7 @@ class Prover {
       slopes.push_back(Slope(input.rate ? x.r : x.v));
     }
     T value(function.value(start.time_s, inputs));
+    const int branch = function.branch ? function.branch(start.time_s, inputs) : kAnyBranch;
     for (size_t k = 0; k < inputs.size(); ++k) {
       if constexpr (kIsDual<T>) {
         if (slopes[k] == 0.0) continue;
@@ -973,7 +974,7 @@ class Prover {
         value.d += slopes[k] * SlopeAt(
                                    [&](double x) {
                                      inputs[k] = x;
-                                     return function.value(start.time_s, inputs);
+                                     return function.At(start.time_s, inputs, branch);
                                    },
                                    at, 0.1 * (length ? length_ : 1.0));
         inputs[k] = at;
@@ -1079,13 +1080,14 @@ class Prover {
   }
 
   // As Followed().
-  static T ForceBy(const ExpressionLaw& law, const Series<T>& x) {
+  static T ForceBy(const ExpressionLaw& law, const Series<T>& x, double unit) {
     const double q = Nearest(x.v), v = Nearest(x.r);
+    const int branch = law.BranchAt(q, v);
     T force(law.force(q, v));
     if constexpr (kIsDual<T>) {
-      constexpr double kReach = 0.1;
-      force.d += Slope(x.v) * SlopeAt([&](double at) { return law.force(at, v); }, q, kReach) +
-                 Slope(x.r) * SlopeAt([&](double at) { return law.force(q, at); }, v, kReach);
+      const double reach = 0.1 * unit;
+      force.d += Slope(x.v) * SlopeAt([&](double at) { return law.At(at, v, branch); }, q, reach) +
+                 Slope(x.r) * SlopeAt([&](double at) { return law.At(q, at, branch); }, v, reach);
     }
     return force;
   }
@@ -1133,7 +1135,14 @@ class Prover {
       }
       force = share * force;
     } else if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
-      force = share * ForceBy(*expression, x);
+      const int branch = expression->BranchAt(Below(x.v), Below(x.r));
+      if (branch != expression->BranchAt(Above(x.v), Above(x.r)) ||
+          branch != expression->BranchAt(Below(x.v), Above(x.r)) ||
+          branch != expression->BranchAt(Above(x.v), Below(x.r))) {
+        return fmt::format("not provable: on which branch '{}' is, is open", element.name);
+      }
+      const double unit = ActsOnLength(mechanism(), element) ? length_ : 1.0;
+      force = share * ForceBy(*expression, x, unit);
     } else if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
       const double rest = RestRate(mechanism(), element, motion_.duration_s);
       const double low = Below(x.r), high = Above(x.r);

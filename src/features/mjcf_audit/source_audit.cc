@@ -33,7 +33,7 @@ class SourceModelRuns {
   explicit SourceModelRuns(const SourceModelRequest& request);
 
   /// Why nothing can be run; "" if it can.
-  [[nodiscard]] const std::string& declined() const { return declined_; }
+  [[nodiscard]] const std::string& not_run() const { return not_run_; }
 
   struct Measured {
     SourceModelRun run;
@@ -61,7 +61,7 @@ class SourceModelRuns {
   DrivenTwists twists_;             // of the drives, for the scale of forces
   std::optional<ReferenceRun> truth_;
   double length_m_ = kNan;
-  std::string declined_;
+  std::string not_run_;
 };
 
 constexpr double kTimeout_s = 30.0;  // of one run
@@ -94,7 +94,7 @@ void SourceModelRuns::FindCommands() {
     if (plain) command_of_[static_cast<size_t>(terms[0].coordinate.index)] = c;
   }
   if (!plain || std::find(command_of_.begin(), command_of_.end(), kNone) != command_of_.end()) {
-    declined_ = "the scenario does more than command each drive by itself";
+    not_run_ = "the scenario does more than command each drive by itself";
     return;
   }
   task_.driven = [this, sample = CommandSample()](double t_s, DrivenSample* driven) mutable {
@@ -555,8 +555,8 @@ class Auditor {
     audit_.file = request_.file;
     audit_.duration_s = request_.prepared->scenario.motion.duration_s;
     audit_.length_m = runs_.length_m();
-    audit_.declined = runs_.declined();
-    if (audit_.declined.empty()) Audit();
+    audit_.not_run = runs_.not_run();
+    if (audit_.not_run.empty()) Audit();
     audit_.seconds = Seconds();
     return std::move(audit_);
   }
@@ -566,7 +566,7 @@ class Auditor {
     Report(0.0);
     const SourceModelRuns::Measured own = runs_.Run({});
     if (own.run.summary.stop == Stop::kUnsupported) {
-      audit_.declined = own.run.summary.message;
+      audit_.not_run = own.run.summary.message;
       return;
     }
     audit_.as_is = own.error;

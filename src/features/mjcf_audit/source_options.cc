@@ -504,7 +504,7 @@ class LeadFinder {
     }
   }
 
-  [[nodiscard]] bool Leads(int actuator) const {
+  [[nodiscard]] bool Drives(int actuator) const {
     return std::any_of(own_.drives.begin(), own_.drives.end(), [&](const OwnDrive& drive) {
       return std::find(drive.actuators.begin(), drive.actuators.end(), actuator) !=
              drive.actuators.end();
@@ -531,7 +531,7 @@ class LeadFinder {
         own_.facts.couplings.push_back(name);
     }
     for (int u = 0; u < m_->nu; ++u) {
-      if (Leads(u)) continue;
+      if (Drives(u)) continue;
       const bool pushes = !IsMotor(*m_, u);
       std::fill_n(m_->actuator_gainprm + mjNGAIN * u, mjNGAIN, 0.0);
       std::fill_n(m_->actuator_biasprm + mjNBIAS * u, mjNBIAS, 0.0);

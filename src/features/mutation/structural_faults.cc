@@ -139,10 +139,15 @@ class Collector {
       std::ranges::reverse(curves->curves);
     }
     if (auto* expression = std::get_if<ExpressionLaw>(&element->law)) {
-      expression->text = "the other way round: " + expression->text;
-      expression->force = [force = expression->force](double x, double v) {
-        return -force(-x, -v);
-      };
+      const ExpressionLaw of = *expression;
+      expression->text = "the other way round: " + of.text;
+      expression->force = [of](double x, double v) { return -of.force(-x, -v); };
+      if (of.branch) {
+        expression->branch = [of](double x, double v) { return of.branch(-x, -v); };
+        expression->on_branch = [of](int branch, double x, double v) {
+          return -of.on_branch(branch, -x, -v);
+        };
+      }
     }
     if (IsGyroscopic(*element)) std::get<RotorLaw>(element->law).ratio *= -1.0;
     if (spring == nullptr) return;
@@ -179,9 +184,16 @@ class Collector {
         Add("curve the other way", element.name, std::move(wrong));
       } else if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
         if (!IsFirst(&curved, element.name)) continue;
-        wrong.elements[e].law = ExpressionLaw{
-            .text = "-(" + expression->text + ")",
-            .force = [force = expression->force](double x, double v) { return -force(x, v); }};
+        const ExpressionLaw of = *expression;
+        ExpressionLaw turned = of;
+        turned.text = "-(" + of.text + ")";
+        turned.force = [of](double x, double v) { return -of.force(x, v); };
+        if (of.branch) {
+          turned.on_branch = [of](int branch, double x, double v) {
+            return -of.on_branch(branch, x, v);
+          };
+        }
+        wrong.elements[e].law = std::move(turned);
         Add("expression the other way", element.name, std::move(wrong));
       } else if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
         if (stop->exponent == 1.0 || !IsFirst(&stopped, element.name)) continue;

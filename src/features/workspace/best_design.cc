@@ -133,13 +133,13 @@ class Search {
  private:
   double Try(const VecX& share) {
     const VecX values = ValuesOf(question_, share);
-    const auto leads = [&](const TriedDesign& design) {
+    const auto is_best = [&](const TriedDesign& design) {
       const bool first = tried_.empty() || !tried_[best_].why.empty();
       return design.why.empty() && (first || design.measure > tried_[best_].measure);
     };
     TriedDesign last = log_.Get<TriedDesign>([&] {
       TriedDesign design = MeasureDesign(model_, values, arguments_, false);
-      if (!leads(design)) return design;
+      if (!is_best(design)) return design;
       // A boundary that is wrong does not lead the search.
       const TriedDesign other = MeasureDesign(
           model_, values, CoarseOf(arguments_, static_cast<int>(arguments_.over.size())), true);
@@ -153,7 +153,7 @@ class Search {
       return design;
     });
     const double measure = last.measure;
-    if (leads(last)) best_ = tried_.size();
+    if (is_best(last)) best_ = tried_.size();
     tried_.push_back(std::move(last));
     if (progress_) {
       progress_(fmt::format("design {} of {}", tried_.size(), most_),

@@ -13,7 +13,6 @@
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "features/workspace/best_design.h"
-#include "features/workspace/constraint_curves.h"
 #include "features/workspace/joint_space.h"
 #include "features/workspace/modes.h"
 #include "features/workspace/set_report.h"

@@ -592,13 +592,14 @@ class SdfImporter {
     };
     const std::string leader = mimic->HasAttribute("joint") ? mimic->Get<std::string>("joint") : "";
     const auto follows = index_.find(of.scope + from.Name()),
-               leads = index_.find(of.scope + leader);
+               leading = index_.find(of.scope + leader);
     const auto is_scalar = [&](const auto& found) {
       return found != index_.end() &&
              DofsOf(m_.joints[static_cast<size_t>(found->second)].kind) == 1;
     };
     const bool second = mimic->HasAttribute("axis") && mimic->Get<std::string>("axis") == "axis2";
-    if (!is_scalar(follows) || !is_scalar(leads) || second || leads->second == follows->second) {
+    if (!is_scalar(follows) || !is_scalar(leading) || second ||
+        leading->second == follows->second) {
       std::vector<std::string> names;
       for (const auto& [name, index] : index_) names.push_back(name);
       Error(what,
@@ -616,7 +617,7 @@ class SdfImporter {
     }
     m_.couplings.push_back(
         {.name = NameOf(of.scope, from.Name()) + "_mimic",
-         .terms = {{follows->second, 0, {-1.0}}, {leads->second, 0, {multiplier}}},
+         .terms = {{follows->second, 0, {-1.0}}, {leading->second, 0, {multiplier}}},
          .constant = constant});
     followers_.insert(follows->second);
   }

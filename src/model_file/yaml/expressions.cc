@@ -191,31 +191,256 @@ std::shared_ptr<Expression> ExpressionOf(const std::string& text) {
   return kept.emplace(text, std::make_shared<Expression>(text)).first->second;
 }
 
+// What decides between branches, and the ways in which it can.
+struct Decision {
+  enum class Kind {
+    kTruth,    // 0, 1
+    kNotLess,  // of abs: by its sign, −1 and 1
+    kSign,     // −1, 0, 1
+    kLeast,    // which of the texts
+    kLargest,
+    kRounded,  // the whole number that is closest
+  };
+  Kind kind = Kind::kTruth;
+  std::vector<std::string> texts;
+};
+
+// An expression that muParser takes, with a name in place of what each decision gives.
+class BranchedText {
+ public:
+  /// `varies`: whether a part has variables; only such parts decide.
+  BranchedText(const std::string& text, std::function<bool(const std::string&)> varies)
+      : varies_(std::move(varies)), text_(Rewritten(text)) {}
+
+  [[nodiscard]] const std::vector<Decision>& decisions() const { return decisions_; }
+  [[nodiscard]] const std::string& text() const { return text_; }
+  [[nodiscard]] static std::string NameOf(size_t decision) {
+    return fmt::format("decided${}", decision);
+  }
+
+ private:
+  static constexpr std::string_view kComparing = "<>=!", kJoining = "?:,&|";
+
+  // A comparison binds looser than arithmetic, and tighter than && || ?: and commas.
+  std::string Rewritten(const std::string& text) {
+    if (!varies_(text)) return text;
+    std::string out;
+    for (size_t from = 0; from <= text.size();) {
+      size_t end = from;
+      bool compares = false;
+      for (int depth = 0; end < text.size(); ++end) {
+        const char c = text[end];
+        depth += c == '(' ? 1 : c == ')' ? -1 : 0;
+        if (depth == 0 && kJoining.find(c) != std::string_view::npos) break;
+        compares = compares || (depth == 0 && kComparing.find(c) != std::string_view::npos);
+      }
+      const std::string side = text.substr(from, end - from);
+      if (!varies_(side)) {
+        out += side;
+      } else {
+        out += compares ? " " + Decide(Decision::Kind::kTruth, {side}) + " " : Arithmetic(side);
+      }
+      if (end < text.size()) out += text[end];
+      from = end + 1;
+    }
+    return out;
+  }
+
+  // Without comparisons outside parentheses.
+  std::string Arithmetic(const std::string& text) {
+    std::string out, name;
+    for (size_t i = 0; i < text.size(); ++i) {
+      if (text[i] != '(') {
+        if (IsNamePart(text[i])) {
+          const bool goes_on = i > 0 && IsNamePart(text[i - 1]);
+          name = (goes_on ? name : "") + text[i];
+        } else if (text[i] != ' ') {
+          name.clear();
+        }
+        out += text[i];
+        continue;
+      }
+      std::vector<std::string> arguments(1);
+      int depth = 0;
+      for (++i; i < text.size() && (text[i] != ')' || depth > 0); ++i) {
+        depth += text[i] == '(' ? 1 : text[i] == ')' ? -1 : 0;
+        if (depth == 0 && text[i] == ',') {
+          arguments.emplace_back();
+        } else {
+          arguments.back() += text[i];
+        }
+      }
+      const bool decides = std::ranges::any_of(arguments, varies_);
+      const std::string call = decides ? Call(name, arguments) : "";
+      if (!call.empty()) {
+        out.resize(out.rfind(name));
+        out += call;
+      } else {
+        out += "(" + Joined(arguments, ",", [this](const auto& a) { return Rewritten(a); }) + ")";
+      }
+      name.clear();
+    }
+    return out;
+  }
+
+  static std::string Joined(const std::vector<std::string>& parts, const char* between,
+                            const std::function<std::string(const std::string&)>& as) {
+    std::string out;
+    for (const std::string& part : parts) out += (&part == parts.data() ? "" : between) + as(part);
+    return out;
+  }
+
+  // What stands for a call of one of the functions that decide; empty for others.
+  std::string Call(const std::string& function, const std::vector<std::string>& arguments) {
+    if (function == "abs") {
+      const std::string sign = Decide(Decision::Kind::kNotLess, arguments);
+      return "(" + sign + "*(" + Rewritten(arguments.front()) + "))";
+    }
+    if (function == "sign") return "(" + Decide(Decision::Kind::kSign, arguments) + ")";
+    if (function == "rint") return "(" + Decide(Decision::Kind::kRounded, arguments) + ")";
+    if (function != "min" && function != "max") return "";
+    const std::string which =
+        Decide(function == "min" ? Decision::Kind::kLeast : Decision::Kind::kLargest, arguments);
+    std::string out = "(";
+    for (size_t k = 0; k + 1 < arguments.size(); ++k) {
+      out += fmt::format("{}=={}?({}):", which, k, Rewritten(arguments[k]));
+    }
+    return out + "(" + Rewritten(arguments.back()) + "))";
+  }
+
+  std::string Decide(Decision::Kind kind, const std::vector<std::string>& texts) {
+    decisions_.push_back({kind, texts});
+    return NameOf(decisions_.size() - 1);
+  }
+
+  const std::function<bool(const std::string&)> varies_;
+  std::vector<Decision> decisions_;
+  const std::string text_;
+};
+
 // Witnesses may run at the same time: one at a time computes.
 class MuFormula : public Formula {
  public:
   MuFormula(const std::string& text, const std::map<std::string, double>& constants,
             const std::vector<std::string>& variables)
       : variables_(variables.size(), 1.0) {
-    for (size_t i = 0; i < variables.size(); ++i) {
-      parser_.DefineVar(variables[i], &variables_[i]);
+    Take(text, constants, variables, &parser_);
+    const auto varies = [&](const std::string& part) {
+      return std::ranges::any_of(NamesIn(part), [&](const UsedName& used) {
+        return std::ranges::find(variables, used.name) != variables.end();
+      });
+    };
+    const BranchedText branched(text, varies);
+    double branches = 1.0;
+    for (const Decision& decision : branched.decisions()) {
+      Chooser& chooser = choosers_.emplace_back(Chooser{.kind = decision.kind, .values = {}});
+      for (const std::string& part : decision.texts) {
+        chooser.values.push_back(std::make_unique<mu::Parser>());
+        Take(part, constants, variables, chooser.values.back().get());
+      }
+      branches *= chooser.ways();
     }
-    Prepare(text, constants, &parser_);
-    int count = 0;
-    parser_.Eval(count);  // parses it
-    if (count != 1) throw mu::ParserError(kSeveralValues);
+    if (choosers_.empty()) return;
+    if (branches > kMostBranches) throw mu::ParserError("it decides between too many branches");
+    decided_.assign(choosers_.size(), 0.0);
+    on_branch_ = std::make_unique<mu::Parser>();
+    on_branch_->DefineNameChars((std::string(parser_.ValidNameChars()) + "$").c_str());
+    for (size_t k = 0; k < decided_.size(); ++k) {
+      on_branch_->DefineVar(BranchedText::NameOf(k), &decided_[k]);
+    }
+    Take(branched.text(), constants, variables, on_branch_.get());
   }
 
   [[nodiscard]] double At(std::span<const double> variables) const override {
     const std::lock_guard lock(mutex_);
-    std::copy(variables.begin(), variables.end(), variables_.begin());
+    Set(variables);
     return parser_.Eval();
   }
 
+  [[nodiscard]] bool has_branches() const override { return !choosers_.empty(); }
+  [[nodiscard]] int BranchAt(std::span<const double> variables) const override {
+    const std::lock_guard lock(mutex_);
+    Set(variables);
+    int branch = 0;
+    for (const Chooser& chooser : choosers_) branch = branch * chooser.ways() + chooser.Way();
+    return branch;
+  }
+  [[nodiscard]] double OnBranch(int branch, std::span<const double> variables) const override {
+    const std::lock_guard lock(mutex_);
+    Set(variables);
+    for (size_t k = choosers_.size(); k-- > 0; branch /= choosers_[k].ways()) {
+      decided_[k] = choosers_[k].Decided(branch % choosers_[k].ways());
+    }
+    const double value = on_branch_->Eval();
+    return std::isfinite(value) ? value : parser_.Eval();
+  }
+
  private:
+  static constexpr double kMostBranches = 1 << 30;
+
+  struct Chooser {
+    static constexpr int kRounded = 1024;  // whole numbers are told apart up to multiples of this
+    Decision::Kind kind;
+    std::vector<std::unique_ptr<mu::Parser>> values;
+
+    [[nodiscard]] int ways() const {
+      switch (kind) {
+        case Decision::Kind::kTruth:
+        case Decision::Kind::kNotLess:
+          return 2;
+        case Decision::Kind::kSign:
+          return 3;
+        case Decision::Kind::kRounded:
+          return kRounded;
+        default:
+          return static_cast<int>(values.size());
+      }
+    }
+    // Which one holds.
+    [[nodiscard]] int Way() const {
+      double value = values.front()->Eval();
+      if (kind == Decision::Kind::kTruth) return value != 0.0 ? 1 : 0;
+      if (kind == Decision::Kind::kNotLess) return value < 0.0 ? 0 : 1;
+      if (kind == Decision::Kind::kSign) return value < 0.0 ? 0 : value > 0.0 ? 2 : 1;
+      if (kind == Decision::Kind::kRounded) {
+        const double rest = std::remainder(std::rint(value), kRounded);
+        return std::isfinite(rest) ? (static_cast<int>(rest) + kRounded) % kRounded : 0;
+      }
+      int chosen = 0;
+      for (size_t k = 1; k < values.size(); ++k) {
+        const double other = values[k]->Eval();
+        if (!(kind == Decision::Kind::kLeast ? other < value : other > value)) continue;
+        value = other;
+        chosen = static_cast<int>(k);
+      }
+      return chosen;
+    }
+    // What stands in the expression then.
+    [[nodiscard]] double Decided(int way) const {
+      if (kind == Decision::Kind::kNotLess) return way == 0 ? -1.0 : 1.0;
+      if (kind == Decision::Kind::kSign) return way - 1.0;
+      if (kind != Decision::Kind::kRounded) return way;
+      return way + kRounded * std::rint((values.front()->Eval() - way) / kRounded);
+    }
+  };
+
+  void Take(const std::string& text, const std::map<std::string, double>& constants,
+            const std::vector<std::string>& variables, mu::Parser* parser) {
+    for (size_t i = 0; i < variables.size(); ++i) parser->DefineVar(variables[i], &variables_[i]);
+    Prepare(text, constants, parser);
+    int count = 0;
+    parser->Eval(count);  // parses it
+    if (count != 1) throw mu::ParserError(kSeveralValues);
+  }
+  void Set(std::span<const double> variables) const {
+    std::copy(variables.begin(), variables.end(), variables_.begin());
+  }
+
   mutable std::mutex mutex_;
-  mutable std::vector<double> variables_;
+  mutable std::vector<double> variables_, decided_;
   mu::Parser parser_;
+  std::vector<Chooser> choosers_;
+  std::unique_ptr<mu::Parser> on_branch_;  // none without branches
 };
 
 }  // namespace

@@ -30,6 +30,17 @@ class Formula {
   virtual ~Formula() = default;
   /// Its value; not finite where it has none. `variables` as they were named, in order.
   [[nodiscard]] virtual double At(std::span<const double> variables) const = 0;
+
+  // Where a comparison, abs, sign, min, max or rint decides between formulas, each is smooth on one
+  // branch and may have a corner or a jump to the next.
+
+  /// True if a variable decides.
+  [[nodiscard]] virtual bool has_branches() const = 0;
+  /// Number of the branch that holds there, >= 0.
+  [[nodiscard]] virtual int BranchAt(std::span<const double> variables) const = 0;
+  /// By the formula of this branch, also where another one holds; by that one where the first has
+  /// no finite value.
+  [[nodiscard]] virtual double OnBranch(int branch, std::span<const double> variables) const = 0;
 };
 /// A formula, or why there is none (as ExpressionResult).
 struct FormulaResult {

@@ -158,6 +158,11 @@ class ConstraintSystem {
   /// it up to its breakaway force. Empty: in free motion MuJoCo's rows do all of it; elsewhere the
   /// rate says.
   void SetSliding(std::vector<int> sign) { sliding_ = std::move(sign); }
+  /// Per element: the branch by which an expression is taken.
+  void SetBranches(std::vector<int> branches) { branches_ = std::move(branches); }
+  [[nodiscard]] int branch(size_t element) const {
+    return element < branches_.size() ? branches_[element] : kAnyBranch;
+  }
   [[nodiscard]] const std::vector<int>& sliding() const { return sliding_; }
   /// Of an element with dry friction, by its joint's load too; of a rigid stop far beyond any.
   [[nodiscard]] double Breakaway(size_t element) const;
@@ -198,7 +203,7 @@ class ConstraintSystem {
   std::vector<bool> coupling_is_length_;
   VecX given_;
   FrictionByLoad load_friction_;
-  std::vector<int> sliding_;
+  std::vector<int> sliding_, branches_;
   std::vector<double> engaged_;
   MatX unit_;  // column k: gradient of driven joint k, where it has no row
   Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)

@@ -259,6 +259,7 @@ ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
   at.rests = std::abs(at.rate) <= place.rest_rate;
   at.load_friction = system.load_friction(element);
   at.load_force = system.load_force(element);
+  at.branch = system.branch(element);
   AddHolding(system, element, &at);
   if (place.carrier >= 0) AddCarrier(system, element, &at);
   return at;
@@ -306,7 +307,7 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     return at.engaged * OfCurves(*curves, at.position, at.rate);
   }
   if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
-    return at.engaged * expression->force(at.position, at.rate);
+    return at.engaged * expression->At(at.position, at.rate, at.branch);
   }
   const auto& rotor = std::get<RotorLaw>(element.law);
   return -rotor.reflected() * at.acceleration - rotor.inertia * rotor.ratio * at.turning.along_rate;
@@ -368,7 +369,7 @@ ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
   return {.stored = PowerSum(work, at.position - spring->free)};
 }
 
-ElementSlope SlopeOf(const ForceElement& element, double position) {
+ElementSlope SlopeOf(const ForceElement& element, double position, double unit) {
   if (const auto* damping = std::get_if<DampingLaw>(&element.law)) return {0.0, damping->damping};
   if (const auto* stop = std::get_if<StopLaw>(&element.law)) {
     if (stop->rigid()) return {};
@@ -399,8 +400,9 @@ ElementSlope SlopeOf(const ForceElement& element, double position) {
     return most;
   }
   if (const auto* expression = std::get_if<ExpressionLaw>(&element.law)) {
-    const double reach = 1e-4;  // central differences, for an estimate [m or rad, per second]
-    const auto& F = expression->force;
+    const double reach = 1e-4 * unit;  // central differences, for an estimate
+    const int branch = expression->BranchAt(position, 0.0);
+    const auto F = [&](double x, double v) { return expression->At(x, v, branch); };
     return {std::max(0.0, (F(position - reach, 0.0) - F(position + reach, 0.0)) / (2.0 * reach)),
             std::max(0.0, (F(position, -reach) - F(position, reach)) / (2.0 * reach))};
   }

@@ -60,6 +60,7 @@ struct ElementMotion {
   int sliding = 0;             ///< where it is known: sign of the rate
   double engaged = 1.0;        ///< share of its force that acts (Switch)
   double held = 0.0;           ///< force of MuJoCo's row that holds it
+  int branch = kAnyBranch;     ///< by which an expression is taken
   RotorTurning turning = {};
 };
 
@@ -96,10 +97,11 @@ struct ElementEnergy {
 [[nodiscard]] ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at);
 
 /// Slope of a spring's force over position, and of a damper's over rate; a curve's steepest one.
+/// `unit`: 1 rad, or the characteristic length.
 struct ElementSlope {
   double stiffness = 0.0, damping = 0.0;
 };
-[[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double position);
+[[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double position, double unit);
 
 /// kUnsupported for a rotor on a distance drive whose motion is not prescribed, and where some
 /// drive is not and MuJoCo steps by itself for rotors with a carrier and for friction other than

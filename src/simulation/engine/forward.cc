@@ -48,7 +48,9 @@ class StickSlip {
   StickSlip(Session* session, Integrator* integrator, CommandAt command);
 
   /// True where something with dry friction, or a law with corners, moves by forces.
-  [[nodiscard]] bool acts() const { return !s_.engine.frictions.empty() || !corners_.empty(); }
+  [[nodiscard]] bool acts() const {
+    return !s_.engine.frictions.empty() || !corners_.empty() || !branching_.empty();
+  }
   /// Decides at the start, before Integrator::Start(): rates show what slides.
   void FindSliding(const Step& first);
   /// Decides what rests at the start, after Integrator::Start().
@@ -79,6 +81,12 @@ class StickSlip {
   [[nodiscard]] RunSummary Apply(const Event& event, double t_s);
   [[nodiscard]] bool Ended() const;
   [[nodiscard]] std::vector<int> Pieces() const;
+  /// True if expressions have branches.
+  [[nodiscard]] bool has_branches() const { return branch_elements_ > 0 || !branching_.empty(); }
+  /// Takes expressions by the branches of pieces_.
+  void FixBranches();
+  /// Forces have jumped with them.
+  [[nodiscard]] RunSummary AfterBranch(double t_s);
   [[nodiscard]] double CornerTime(const Integrator::Node& node, double from_s, double h);
   [[nodiscard]] bool Stopped(size_t element) const;
   /// Sign of a held element's acceleration, 0 where MuJoCo holds it.
@@ -113,7 +121,9 @@ class StickSlip {
   std::vector<size_t> friction_elements_;
   std::vector<size_t> off_;      ///< switched off: they count as sliding, without a force
   std::vector<size_t> corners_;  ///< elements whose law has corners
-  std::vector<int> pieces_;      ///< of these, at the present node
+  size_t branch_elements_ = 0;   ///< expressions among them
+  const std::vector<BranchingFunction> branching_;
+  std::vector<int> pieces_;      ///< of corners_, then of branching_, at the present node
   std::vector<double> rates_;    ///< of these, by (1)
   std::vector<std::pair<size_t, int>> ends_;  ///< of rigid stops
   std::vector<double> closed_;                ///< per end: its gap at the node where that is closed
@@ -142,7 +152,12 @@ constexpr int kMostRounds = 40, kMostEvents = 1000;  // at one node, in one step
 constexpr double kTouches = 1e-12;
 
 StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command)
-    : s_(*session), integrator_(*integrator), command_(std::move(command)) {
+    : s_(*session),
+      integrator_(*integrator),
+      command_(std::move(command)),
+      branching_(s_.motion.free() || IsReleased(s_.engine)
+                     ? BranchingFunctions(*s_.engine.mechanism, s_.motion)
+                     : std::vector<BranchingFunction>{}) {
   const std::vector<ForceElement>& elements = s_.engine.mechanism->elements;
   for (size_t e = 0; e < elements.size(); ++e) {
     if (HasFriction(elements[e]) && !s_.engine.elements[e].prescribed)
@@ -152,6 +167,7 @@ StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command
   for (size_t e = 0; e < elements.size() && moves_by_forces; ++e) {
     if (!IsRigidStop(elements[e])) {
       if (HasCorners(elements[e])) corners_.push_back(e);
+      branch_elements_ += std::holds_alternative<ExpressionLaw>(elements[e].law) ? 1 : 0;
       continue;
     }
     const auto& stop = std::get<StopLaw>(elements[e].law);
@@ -185,6 +201,7 @@ RunSummary StickSlip::SwitchOver(const Step& step) {
 
 RunSummary StickSlip::Begin() {
   pieces_ = Pieces();
+  FixBranches();
   RunSummary summary = LetGo(0.0);
   NoteEvents(0.0);
   if (!summary.ok() || ends_.empty()) return summary;
@@ -332,6 +349,9 @@ void StickSlip::NoteEvents(double t_s) {
     const ForceElement& element = elements[corners_[k]];
     log_.Note(element, t_s, HappeningOn(element, pieces_[k]), pieces_[k]);
   }
+  for (size_t k = 0; k < branching_.size(); ++k) {
+    log_.Note(branching_[k].path, t_s, Happening::kBranch, pieces_[corners_.size() + k]);
+  }
   for (const auto& [e, side] : ends_) {
     log_.Note(elements[e], t_s,
               touch_[e] == 0  ? Happening::kFree
@@ -349,7 +369,33 @@ std::vector<int> StickSlip::Pieces() const {
     const ElementMotion at = ElementMotionOf(s_.system, e);
     pieces.push_back(PieceOf(s_.engine.mechanism->elements[e], at.position, at.rate));
   }
+  if (!branching_.empty()) {
+    const std::vector<int>& branches = s_.loads.branches();
+    pieces.insert(pieces.end(), branches.begin(), branches.end());
+  }
   return pieces;
+}
+
+void StickSlip::FixBranches() {
+  if (!has_branches()) return;
+  std::vector<int> of_elements(s_.engine.mechanism->elements.size(), kAnyBranch);
+  for (size_t k = 0; k < corners_.size(); ++k) {
+    const size_t e = corners_[k];
+    if (std::holds_alternative<ExpressionLaw>(s_.engine.mechanism->elements[e].law)) {
+      of_elements[e] = pieces_[k];
+    }
+  }
+  s_.system.SetBranches(std::move(of_elements));
+  s_.loads.FixBranches({pieces_.begin() + static_cast<long>(corners_.size()), pieces_.end()});
+}
+
+RunSummary StickSlip::AfterBranch(double t_s) {
+  FixBranches();
+  if (RunSummary summary = Jump(t_s); !summary.ok()) return summary;
+  if (RunSummary summary = LetGo(t_s); !summary.ok()) return summary;
+  if (RunSummary summary = LeaveStops(t_s); !summary.ok()) return summary;
+  s_.work.Jump(s_.WorkRates());
+  return RunSummary::Done();
 }
 
 // The first time found beyond which some law is on another piece, where one is at the end.
@@ -415,6 +461,11 @@ RunSummary StickSlip::AfterJump(const Step& next) {
     if (IsOff(e) != std::ranges::binary_search(before, e)) FindDirection(e);
   }
   if (RunSummary summary = Jump(next.from_s); !summary.ok()) return summary;
+  if (has_branches()) {  // a signal that jumps may decide, too
+    pieces_ = Pieces();
+    FixBranches();
+    if (RunSummary summary = Jump(next.from_s); !summary.ok()) return summary;
+  }
   if (RunSummary summary = LetGo(next.from_s); !summary.ok()) return summary;
   if (RunSummary summary = LeaveStops(next.from_s); !summary.ok()) return summary;
   NoteEvents(next.from_s);
@@ -624,7 +675,12 @@ RunSummary StickSlip::Advance(const Step& step) {
     } else if (RunSummary summary = Jump(from); !summary.ok()) {
       return summary;
     }
-    pieces_ = Pieces();
+    std::vector<int> pieces = Pieces();
+    const bool branches = has_branches() && pieces != pieces_;
+    pieces_ = std::move(pieces);
+    if (branches) {
+      if (RunSummary summary = AfterBranch(from); !summary.ok()) return summary;
+    }
     if (event.of_stops()) {
       for (const size_t e : event.leaves) touch_[e] = 0, sliding_[e] = 1;
       RunSummary summary = event.hits.empty() ? Jump(from) : Strike(event.hits, from);
@@ -650,7 +706,10 @@ RunSummary StickSlip::Advance(const Step& step) {
   return {.stop = Stop::kNoConvergence,
           .message = fmt::format(
               "{} again and again at t = {:.6g} s",
-              ends_.empty() ? "friction starts and stops" : "rigid stops are hit", from),
+              has_branches()  ? "expressions change between branches"
+              : ends_.empty() ? "friction starts and stops"
+                              : "rigid stops are hit",
+              from),
           .time_s = from,
           .states_time = true};
 }

@@ -452,7 +452,8 @@ std::vector<Elastic> ElasticParts(const ConstraintSystem& system, const ServoGai
   }
   for (size_t e = 0; e < engine.elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
-    const ElementSlope slope = SlopeOf(element, ElementMotionOf(system, e).position);
+    const double unit = ActsOnLength(*engine.mechanism, element) ? system.length() : 1.0;
+    const ElementSlope slope = SlopeOf(element, ElementMotionOf(system, e).position, unit);
     if (slope.stiffness == 0.0 && slope.damping == 0.0) continue;
     parts.push_back({"element '" + element.name + "'", ElementGradient(system, e), slope.stiffness,
                      slope.damping});

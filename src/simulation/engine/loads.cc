@@ -96,7 +96,10 @@ RunSummary CheckInputs(const EngineModel& engine, const StateFunction& function,
 }  // namespace
 
 FollowingLoads::FollowingLoads(const EngineModel& engine, const Motion& motion)
-    : engine_(engine), motion_(motion) {
+    : engine_(engine),
+      motion_(motion),
+      branching_(BranchingFunctions(*engine.mechanism, motion)),
+      branches_(branching_.size(), 0) {
   const auto add = [&](const StateFunction& function, std::vector<Angle>* angles) {
     for (const StateFunction::Input& input : function.inputs) {
       angles->push_back({.value = StartAngle(*engine.mechanism, motion, input.coordinate)});
@@ -134,7 +137,14 @@ double FollowingLoads::FunctionAt(const StateFunction& function, const std::stri
   for (const StateFunction::Input& input : function.inputs) {
     inputs.push_back(Read(input, d, t_s, angle++));
   }
-  const double value = function.value(t_s, inputs);
+  int branch = kAnyBranch;
+  if (function.branch) {
+    const auto of = std::ranges::find(branching_, &function, &BranchingFunction::function);
+    const auto at = static_cast<size_t>(of - branching_.begin());
+    branches_[at] = function.branch(t_s, inputs);
+    if (!fixed_.empty()) branch = fixed_[at];
+  }
+  const double value = function.At(t_s, inputs, branch);
   if (std::isfinite(value)) return value;
   // Left out: the run ends, and MuJoCo gets numbers until then.
   if (trouble_.ok()) trouble_ = HasNoValue(*engine_.mechanism, path, function, t_s, inputs, value);

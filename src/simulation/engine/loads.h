@@ -24,6 +24,10 @@ class FollowingLoads {
   [[nodiscard]] double ForceOf(size_t k, const mjData& d, double t_s);
   /// The first part that was not finite.
   [[nodiscard]] const RunSummary& trouble() const { return trouble_; }
+  /// On which branch each of BranchingFunctions() was when it was evaluated last.
+  [[nodiscard]] const std::vector<int>& branches() const { return branches_; }
+  /// From here on they are taken by these branches; empty: by the ones that hold.
+  void FixBranches(std::vector<int> branches) { fixed_ = std::move(branches); }
 
  private:
   // An angle when it was evaluated last.
@@ -38,6 +42,8 @@ class FollowingLoads {
   const EngineModel& engine_;
   const Motion& motion_;
   std::vector<std::vector<Angle>> angles_;  ///< per load and drive force: of all inputs
+  const std::vector<BranchingFunction> branching_;
+  std::vector<int> branches_, fixed_;
   RunSummary trouble_ = RunSummary::Done();
 };
 
@@ -74,6 +80,9 @@ class Loads {
   [[nodiscard]] bool follow() const;
   /// The first load that was not finite; then nothing evaluated since is.
   [[nodiscard]] const RunSummary& trouble() const { return following_.trouble(); }
+  /// FollowingLoads::branches() of what was evaluated last.
+  [[nodiscard]] const std::vector<int>& branches() const { return following_.branches(); }
+  void FixBranches(std::vector<int> branches) { following_.FixBranches(std::move(branches)); }
   [[nodiscard]] const std::vector<WorldLoad>& world() const { return world_; }
   [[nodiscard]] const std::vector<JointForce>& joint_forces() const { return joint_forces_; }
   /// Adds Jᵀ(load) of the loads last evaluated to `qfrc` (nv).

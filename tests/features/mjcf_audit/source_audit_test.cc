@@ -89,7 +89,7 @@ class SourceModelAudits : public testing::Test {
 TEST_F(SourceModelAudits, InWhichNothingIsWrongIsReportedSo) {
   const SourceModelAudit audit =
       Audit(Text({.head = std::string("<option timestep='0.0005' integrator='RK4'/>") + kStiff}));
-  ASSERT_TRUE(audit.declined.empty()) << audit.declined;
+  ASSERT_TRUE(audit.not_run.empty()) << audit.not_run;
   EXPECT_TRUE(audit.Good(audit.as_is)) << audit.as_is.failure << audit.as_is.force;
   EXPECT_LT(audit.as_is.force, 1e-3);
   EXPECT_LT(audit.as_is.joint_force, 1e-3);  // sign and frame of the closures' forces are right
@@ -303,13 +303,13 @@ TEST_F(SourceModelAudits, FrictionOfContactsIsNotAMatterHere) {
   EXPECT_TRUE(found);
 }
 
-TEST_F(SourceModelAudits, ADriveWithoutANameForItsJointIsDeclined) {
+TEST_F(SourceModelAudits, ADriveWithoutANameForItsJointIsNotAudited) {
   std::string text = Text({.actuator = ""});
   for (const char* name : {R"(name="A" )", R"(name="B" )", R"(name="D" )"}) {
     text.erase(text.find(name), std::string(name).size());
   }
   const SourceModelAudit audit = Audit(text);
-  EXPECT_NE(audit.declined.find("has no name in the file"), std::string::npos) << audit.declined;
+  EXPECT_NE(audit.not_run.find("has no name in the file"), std::string::npos) << audit.not_run;
 }
 
 }  // namespace

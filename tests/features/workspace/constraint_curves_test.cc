@@ -1,11 +1,10 @@
 // Constraint singularities inside a set, by closed form.
-#include "features/workspace/constraint_curves.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
+#include "features/workspace/reachable_set.h"
 #include "model_file/load_model.h"
 #include "tests/support/source_dir.h"
 

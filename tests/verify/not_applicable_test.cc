@@ -37,7 +37,7 @@ void Replace(const std::string& from, const std::string& to, std::string* text) 
 class Copy {
  public:
   explicit Copy(const std::string& name)
-      : folder_(fs::path(testing::TempDir()) / "mbv_decline" / name) {
+      : folder_(fs::path(testing::TempDir()) / "mbv_not_applicable" / name) {
     fs::create_directories(folder_);
   }
   std::string Model(const std::string& text) const { return Write("model.yaml", text); }
@@ -80,7 +80,7 @@ Outcome RunFile(const std::string& scenario, std::vector<SetValue> set = {}) {
   return outcome;
 }
 
-void ExpectDeclined(const Outcome& outcome, const std::string& fact, const std::string& why) {
+void ExpectNotApplicable(const Outcome& outcome, const std::string& fact, const std::string& why) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.findings;  // the other two agree
   EXPECT_TRUE(outcome.others_ran);
   EXPECT_NE(outcome.reason.find(fact), std::string::npos) << outcome.reason;
@@ -97,9 +97,9 @@ TEST(WarnNotApplicable, ACentreOfMassBesideTheLink) {
   const std::string file = copy.Model(model);
   const std::string scenario = copy.Scenario(
       ReadShipped("scenarios/stabilizing_platform/sea_state.yaml"), "stabilizing_platform");
-  ExpectDeclined(RunFile(scenario, {{"motion.sample_s", "0.1"}}),
-                 "body limb1.link1: centre of mass x is 0.4 m",
-                 "the closed form of the stabilizing platform takes 0 m");
+  ExpectNotApplicable(RunFile(scenario, {{"motion.sample_s", "0.1"}}),
+                      "body limb1.link1: centre of mass x is 0.4 m",
+                      "the closed form of the stabilizing platform takes 0 m");
   // `check` says so for the model alone, too.
   const Diagnostics check = CheckFile(file);
   EXPECT_FALSE(check.has_errors());
@@ -107,8 +107,9 @@ TEST(WarnNotApplicable, ACentreOfMassBesideTheLink) {
                 "the closed form will not be applicable: body limb3.link1: centre of mass x"),
             std::string::npos)
       << check.Text();
-  EXPECT_EQ(CheckFile(SourcePath("/models/stabilizing_platform/model.yaml")).Text().find("decline"),
-            std::string::npos);
+  EXPECT_EQ(
+      CheckFile(SourcePath("/models/stabilizing_platform/model.yaml")).Text().find("applicable"),
+      std::string::npos);
 }
 
 TEST(WarnNotApplicable, AMissingFractionIsNotTakenAsOneHalf) {
@@ -121,8 +122,8 @@ TEST(WarnNotApplicable, AMissingFractionIsNotTakenAsOneHalf) {
   copy.Model(model);
   const std::string scenario = copy.Scenario(
       ReadShipped("scenarios/stabilizing_platform/sea_state.yaml"), "stabilizing_platform");
-  ExpectDeclined(RunFile(scenario, {{"motion.sample_s", "0.1"}}), "parameter c_1 is missing",
-                 "reads it by this name");
+  ExpectNotApplicable(RunFile(scenario, {{"motion.sample_s", "0.1"}}), "parameter c_1 is missing",
+                      "reads it by this name");
 }
 
 TEST(WarnNotApplicable, ASpringOnTheCabinRobotAndTheTripod) {
@@ -133,8 +134,8 @@ TEST(WarnNotApplicable, ASpringOnTheCabinRobotAndTheTripod) {
                "\nsprings:\n  buffer: {from: " + from + ", to: " + to +
                ", stiffness: 1000, damping: 20, free_length: 0.1}\n");
     const std::string file = std::string("scenarios/") + name + "/static.yaml";
-    ExpectDeclined(RunFile(copy.Scenario(ReadShipped(file), name)),
-                   "spring-damper buffer of 1000 N/m and 20 N s/m", "has no springs");
+    ExpectNotApplicable(RunFile(copy.Scenario(ReadShipped(file), name)),
+                        "spring-damper buffer of 1000 N/m and 20 N s/m", "has no springs");
   }
 }
 
@@ -149,7 +150,7 @@ TEST(WarnNotApplicable, ALoadOnABodyThatTheEquationsDoNotKnow) {
       copy.Scenario(ReadShipped("scenarios/cabin_robot/static.yaml") +
                         "\nloads: {cable: {on: camera, force: [10, -20, 5]}}\n",
                     "cabin_robot");
-  ExpectDeclined(RunFile(scenario), "load cable acts on camera", "takes loads on carriage");
+  ExpectNotApplicable(RunFile(scenario), "load cable acts on camera", "takes loads on carriage");
   // Without the load, a body without mass changes nothing.
   const std::string bare =
       copy.Scenario(ReadShipped("scenarios/cabin_robot/static.yaml"), "cabin_robot");
