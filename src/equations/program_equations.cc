@@ -342,9 +342,12 @@ class ProgramEquations final : public Equations {
     // A program that is started again knows nothing.
     const bool again = loaded_ && !program_->running();
     if (call.at("do") == "load") {
+      if (!program_->running()) parameters_.reset();
       loaded_ = true;
     } else if (again || !loaded_) {
+      const auto parameters = parameters_;
       if (auto info = Load(); !info) return {{}, std::move(info.failure)};
+      parameters_ = parameters;
       if (parameters_ && call.at("do") != "set") {
         const Json set = {{"do", "set"}, {"parameters", *parameters_}};
         const auto done = Exchange<bool>(set, kCall_s, [](const JsonValue&) { return true; });

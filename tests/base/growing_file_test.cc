@@ -70,8 +70,12 @@ TEST(StreamFromChildren, TextsSentTogetherAreLostWithTheirChildAlone) {
     StreamFromChildren(2000, {.parallel = parallel, .timeout_s = 5.0, .together = true}, work,
                        [&](size_t i, const std::optional<std::string>& text) {
                          (text ? given : lost) += 1;
-                         if (text) EXPECT_EQ(*text, std::to_string(i));
-                         if (i == 40) EXPECT_FALSE(text);
+                         if (text) {
+                           EXPECT_EQ(*text, std::to_string(i));
+                         }
+                         if (i == 40) {
+                           EXPECT_FALSE(text);
+                         }
                          after = after || (i > 40 && !text);
                          return true;
                        });

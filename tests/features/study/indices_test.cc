@@ -78,10 +78,10 @@ double GFunction(const std::vector<double>& x) {
 
 // Share of all intervals of a function's indices, over many seeds, that contain the true ones when
 // they are stretched about their middles.
-class Coverage {
+class IntervalHits {
  public:
-  Coverage(const Function& f, Uniform range, std::vector<double> first, std::vector<double> total,
-           std::uint64_t blocks)
+  IntervalHits(const Function& f, Uniform range, std::vector<double> first,
+               std::vector<double> total, std::uint64_t blocks)
       : first_(std::move(first)), total_(std::move(total)) {
     for (std::uint64_t seed = 1; seed <= 200; ++seed) {
       results_.push_back(
@@ -114,11 +114,11 @@ class Coverage {
 // one seed vary mostly by themselves.
 constexpr double kStrays = 0.5 * 3.0 * 0.0154;
 
-void ExpectNinetyFivePercent(const Coverage& coverage) {
-  EXPECT_NEAR(coverage.At(1.0), 0.95, kStrays);
+void ExpectNinetyFivePercent(const IntervalHits& hits) {
+  EXPECT_NEAR(hits.At(1.0), 0.95, kStrays);
   // What is half as wide again, or narrower by that, does not pass.
-  EXPECT_GT(coverage.At(1.5), 0.95 + kStrays);
-  EXPECT_LT(coverage.At(1.0 / 1.5), 0.95 - kStrays);
+  EXPECT_GT(hits.At(1.5), 0.95 + kStrays);
+  EXPECT_LT(hits.At(1.0 / 1.5), 0.95 - kStrays);
 }
 
 TEST(SobolIndices, IntervalsOfIshigamisFunctionContainTheTruthNinetyFiveTimesInAHundred) {

@@ -78,7 +78,7 @@ TEST_F(StudyCommand, ALimitThatTooManyPointsViolateEndsWithOne) {
 }
 
 TEST_F(StudyCommand, IndicesOfAProductAreThoseByHand) {
-  WriteStudy("{saltelli: 128}");
+  WriteStudy("{saltelli: 1024}");
   ASSERT_EQ(Study("out").exit_code, 0);
   const auto force = Summary("out")["quantities"][0];
   const double G = force["nominal"].get<double>() / 2.0, v = 1.0 / 3.0;
