@@ -355,9 +355,10 @@ class FunctionReader {
       return all;
     };
     StateFunction function{.inputs = inputs_,
-                           .value = [formula, known](double t_s, std::span<const double> inputs) {
-                             return formula->At(known(t_s, inputs));
-                           },
+                           .value =
+                               [formula, known](double t_s, std::span<const double> inputs) {
+                                 return formula->At(known(t_s, inputs));
+                               },
                            .signals = used_};
     if (!formula->has_branches()) return function;
     function.branch = [formula, known](double t_s, std::span<const double> inputs) {
@@ -438,7 +439,8 @@ StateFunctions::StateFunctions(ValueReader* values, const Mechanism& mechanism,
     }
   }
   for (const YamlEntry& entry : yaml.Entries(*variables, "variables")) {
-    if (entry.value->is_scalar() && !yaml.has_errors()) (void)Read(*entry.value, "variables." + entry.key);
+    if (entry.value->is_scalar() && !yaml.has_errors())
+      (void)Read(*entry.value, "variables." + entry.key);
   }
 }
 
@@ -447,8 +449,7 @@ bool StateFunctions::Follows(const YamlNode& node) const {
   const std::vector<Piece> pieces = PiecesOf(node.text);
   return std::ranges::any_of(pieces, [&](const Piece& piece) {
     return piece.is_dotted() || (piece.text == kTime && !values_.HasParameter(kTime)) ||
-           (piece.is_word &&
-            (variables_.contains(piece.text) || signals_.contains(piece.text)));
+           (piece.is_word && (variables_.contains(piece.text) || signals_.contains(piece.text)));
   });
 }
 

@@ -104,10 +104,10 @@ TEST(StateFunctions, KnowSignalsOfTheTimeAndTheirJumps) {
                              "\"]}}\nanalytic: none\n";
     return LoadScenario(folder.Write("s.yaml", text));
   };
-  const ScenarioResult result =
-      with("{wind: {table: {csv: wind.csv, column: v}}, gust: [0.5, {step: {height: 2, at_s: 0.4}}],"
-           " both: wind + gust}",
-           "-both*motor.velocity - (wind > 3.5)");
+  const ScenarioResult result = with(
+      "{wind: {table: {csv: wind.csv, column: v}}, gust: [0.5, {step: {height: 2, at_s: 0.4}}],"
+      " both: wind + gust}",
+      "-both*motor.velocity - (wind > 3.5)");
   ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
   const Motion& motion = result.scenario->motion;
   const StateFunction& f = motion.loads.at(0).following.at(0).function;
@@ -120,8 +120,9 @@ TEST(StateFunctions, KnowSignalsOfTheTimeAndTheirJumps) {
   EXPECT_NE(f.branch(0.5, std::vector<double>{2.0}), f.branch(0.25, std::vector<double>{2.0}));
   EXPECT_EQ(BranchingFunctions(*result.mechanism, motion).at(0).path, "loads.l.moment[2]");
   EXPECT_NE(with("{a: {sinus: 1}}", "a").diagnostics.Text().find("variables.a"), std::string::npos);
-  EXPECT_NE(with("{a: {table: {csv: none.csv, column: v}}}", "a").diagnostics.Text().find("none.csv"),
-            std::string::npos);
+  EXPECT_NE(
+      with("{a: {table: {csv: none.csv, column: v}}}", "a").diagnostics.Text().find("none.csv"),
+      std::string::npos);
 }
 
 TEST(StateLoads, UnknownNamesAreFindings) {
