@@ -432,7 +432,7 @@ StateFunctions::StateFunctions(ValueReader* values, const Mechanism& mechanism,
       yaml.Error(entry, fmt::format("{}: {}", path, why_not));
     } else if (!entry.value->is_scalar()) {
       const ProfileContext context{
-          .unit = "", .home = {}, .name = path, .may_jump = true, .tables = tables};
+          .unit = "1", .home = {}, .name = path, .may_jump = true, .tables = tables};
       signals_[entry.key] = ReadProfile(values, *entry.value, path, context);
     } else if (const auto text = yaml.Text(*entry.value, path)) {
       variables_[entry.key] = *text;
