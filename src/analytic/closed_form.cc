@@ -5,16 +5,27 @@
 
 namespace mbv {
 
-ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
-                            ClosedForm* closed_form) {
-  ClosedFormRun run;
+namespace {
+
+std::vector<Channel> ChannelsOf(const Mechanism& mechanism, const ClosedForm& closed_form) {
   std::vector<Channel> channels = DriveChannels(mechanism);
-  const bool forces = closed_form->gives_forces();
-  if (!forces) {
+  if (!closed_form.gives_forces()) {
     std::erase_if(channels, [](const Channel& c) { return c.quantity == Quantity::kForce; });
   }
-  for (Channel& channel : closed_form->extra_channels()) channels.push_back(std::move(channel));
+  for (Channel& channel : closed_form.extra_channels()) channels.push_back(std::move(channel));
+  return channels;
+}
+
+}  // namespace
+
+ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
+                            ClosedForm* closed_form, Trace reuse) {
+  ClosedFormRun run{.trace = std::move(reuse), .summary = {}};
+  const bool forces = closed_form->gives_forces();
+  std::vector<Channel> channels = run.trace.channels.empty() ? ChannelsOf(mechanism, *closed_form)
+                                                             : std::move(run.trace.channels);
   run.trace.witness = role::kAnalytic.name;
+  run.trace.events.clear();
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
 
   const ComputingTime time;

@@ -70,6 +70,9 @@ struct ClosedFormRow {
   /// asked: outside, there is no closed form, and the other witnesses go on. nullptr: nothing is
   /// checked.
   CoverageFunction coverage = nullptr;
+  /// The form reads which coordinates a motion commands but no profile when it is made, and no
+  /// sample says anything of a later one: it serves every motion of these commands and loads.
+  bool serves_any_profiles = false;
 };
 
 /// All registered closed forms.
@@ -85,7 +88,9 @@ struct ClosedFormRun {
   Trace trace;
   RunSummary summary;
 };
+/// `reuse`: the trace of an earlier run of the same mechanism and kind of form, whose channels and
+/// memory are taken over.
 [[nodiscard]] ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
-                                          ClosedForm* closed_form);
+                                          ClosedForm* closed_form, Trace reuse = {});
 
 }  // namespace mbv

@@ -19,6 +19,7 @@
 #include <iterator>
 #include <sstream>
 #include <thread>
+#include <utility>
 
 #include "base/files.h"
 
@@ -197,20 +198,29 @@ bool WriteBytes(int pipe, const void* bytes, size_t count) {
 
 // In the child: each text after its length, until something ends it.
 [[noreturn]] void Serve(int pipe, pid_t parent, const Work& work, size_t first, size_t step,
-                        size_t count) {
+                        size_t count, bool together) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   const int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
   for (int stream = 0; stream < 3; ++stream) dup2(nothing, stream);
+  constexpr size_t kMostBytes = 1 << 14;
+  constexpr std::chrono::milliseconds kLongest{1};
+  std::string pending;
+  Clock::time_point written = Clock::now();
   try {
     for (size_t i = first; i < count; i += step) {
       const std::string text = work(i);
       const std::uint64_t size = text.size();
-      if (!WriteBytes(pipe, &size, sizeof size) || !WriteBytes(pipe, text.data(), text.size())) {
-        _exit(1);
-      }
+      pending.append(reinterpret_cast<const char*>(&size), sizeof size);
+      pending += text;
+      const auto now = Clock::now();
+      const bool waits = together && pending.size() < kMostBytes && now - written < kLongest;
+      if (waits && i + step < count) continue;
+      if (!WriteBytes(pipe, pending.data(), pending.size())) _exit(1);
+      pending.clear();
+      written = now;
     }
   } catch (...) {
     _exit(1);
@@ -218,34 +228,60 @@ bool WriteBytes(int pipe, const void* bytes, size_t count) {
   _exit(0);
 }
 
-// Reads `count` bytes; false at the end of the pipe or of the time.
-bool ReadBytes(int pipe, void* bytes, size_t count, Clock::time_point end) {
-  char* at = static_cast<char*>(bytes);
-  while (count > 0) {
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now()).count();
-    pollfd waiting{pipe, POLLIN, 0};
-    const int ready = left > 0 ? poll(&waiting, 1, static_cast<int>(left)) : 0;
-    if (ready < 0 && errno == EINTR) continue;
-    if (ready <= 0) return false;
-    const ssize_t n = read(pipe, at, count);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    at += n;
-    count -= static_cast<size_t>(n);
+// Texts from a pipe, each after its length.
+class TextReader {
+ public:
+  void Open(int pipe) {
+    pipe_ = pipe;
+    received_.clear();
+    at_ = 0;
   }
-  return true;
-}
+  // Empty at the end of the pipe or of the time.
+  std::optional<std::string> Next(double timeout_s) {
+    constexpr std::uint64_t kMostBytes = 64'000'000;
+    std::uint64_t size = 0;
+    Clock::time_point end{};  // not needed for what was received already
+    if (received_.size() - at_ < sizeof size) end = EndOf(timeout_s);
+    if (!Receive(sizeof size, end)) return std::nullopt;
+    std::memcpy(&size, received_.data() + at_, sizeof size);
+    if (size > kMostBytes) return std::nullopt;
+    if (end == Clock::time_point{}) end = EndOf(timeout_s);
+    if (!Receive(sizeof size + size, end)) return std::nullopt;
+    std::string text = received_.substr(at_ + sizeof size, size);
+    at_ += sizeof size + size;
+    return text;
+  }
 
-std::optional<std::string> ReadText(int pipe, double timeout_s) {
-  constexpr std::uint64_t kMostBytes = 64'000'000;
-  const auto end = Clock::now() + std::chrono::milliseconds(static_cast<long>(1e3 * timeout_s));
-  std::uint64_t size = 0;
-  if (!ReadBytes(pipe, &size, sizeof size, end) || size > kMostBytes) return std::nullopt;
-  std::string text(size, '\0');
-  if (!ReadBytes(pipe, text.data(), size, end)) return std::nullopt;
-  return text;
-}
+ private:
+  static Clock::time_point EndOf(double timeout_s) {
+    return Clock::now() + std::chrono::milliseconds(static_cast<long>(1e3 * timeout_s));
+  }
+  // Until `count` bytes are there that were not taken yet.
+  bool Receive(size_t count, Clock::time_point end) {
+    constexpr size_t kAtOnce = 1 << 16;
+    if (received_.size() - at_ >= count) return true;
+    received_.erase(0, std::exchange(at_, 0));
+    while (received_.size() < count) {
+      const auto left =
+          std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now()).count();
+      pollfd waiting{pipe_, POLLIN, 0};
+      const int ready = left > 0 ? poll(&waiting, 1, static_cast<int>(left)) : 0;
+      if (ready < 0 && errno == EINTR) continue;
+      if (ready <= 0) return false;
+      const size_t before = received_.size();
+      received_.resize(before + kAtOnce);
+      const ssize_t n = read(pipe_, received_.data() + before, kAtOnce);
+      received_.resize(before + static_cast<size_t>(std::max<ssize_t>(n, 0)));
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) return false;
+    }
+    return true;
+  }
+
+  int pipe_ = -1;
+  std::string received_;
+  size_t at_ = 0;  // of what was not taken yet
+};
 
 // A child that gives the texts of work(first), work(first + step), …
 class Child {
@@ -255,20 +291,21 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  void Start(const Work& work, size_t first, size_t step, size_t count) {
+  void Start(const Work& work, size_t first, size_t step, size_t count, bool together) {
     int ends[2];
     const pid_t parent = getpid();
     if (pipe2(ends, O_CLOEXEC) != 0) return;
     pid_ = fork();
-    if (pid_ == 0) Serve(ends[1], parent, work, first, step, count);
+    if (pid_ == 0) Serve(ends[1], parent, work, first, step, count, together);
     close(ends[1]);
     pipe_ = ends[0];
+    texts_.Open(pipe_);
     if (pid_ < 0) End();  // no processes left
   }
   [[nodiscard]] bool runs() const { return pid_ > 0; }
   // The next text; without one the child ends.
   std::optional<std::string> Next(double timeout_s) {
-    auto text = runs() ? ReadText(pipe_, timeout_s) : std::nullopt;
+    auto text = runs() ? texts_.Next(timeout_s) : std::nullopt;
     if (!text) End();
     return text;
   }
@@ -285,6 +322,7 @@ class Child {
 
   pid_t pid_ = -1;
   int pipe_ = -1;
+  TextReader texts_;
 };
 
 }  // namespace
@@ -296,10 +334,12 @@ void StreamFromChildren(
     const std::function<bool(size_t, const std::optional<std::string>&)>& take) {
   const size_t parallel = std::min(static_cast<size_t>(streams.parallel), count);
   std::vector<Child> children(parallel);
-  for (size_t k = 0; k < parallel; ++k) children[k].Start(work, k, parallel, count);
+  for (size_t k = 0; k < parallel; ++k) {
+    children[k].Start(work, k, parallel, count, streams.together);
+  }
   for (size_t i = 0; i < count; ++i) {
     Child& child = children[i % parallel];
-    if (!child.runs()) child.Start(work, i, parallel, count);
+    if (!child.runs()) child.Start(work, i, parallel, count, false);
     if (!take(i, child.Next(streams.timeout_s))) return;
   }
 }

@@ -63,6 +63,9 @@ struct WorkerPool {
 struct ChildStreams {
   int parallel = 1;          ///< children at once, at least 1
   double timeout_s = 300.0;  ///< for each text, from when it is the next one
+  /// Texts that come within a millisecond are sent together: the last ones before a child's death
+  /// are lost with it. Children that follow a lost one send each by itself.
+  bool together = false;
 };
 
 /// Calls work(0) … work(count − 1) in child processes, and take(i, text) here, in that order; empty

@@ -284,6 +284,7 @@ RunSummary ClosureSolver::Prepare() {
   }
   Trial home{states_, near_values_};
   EvaluateRows(&home);
+  rows_are_here_ = true;
   FindTransmitting();
   near_values_ = home.near_values;
   target_ = Eigen::Map<const VecX>(rows_.value.data() + joint_rows_, rows_.size() - joint_rows_);
@@ -356,9 +357,10 @@ RunSummary ClosureSolver::Follow(const VecX& target, int first_steps) {
   while (reached < 1.0) {
     const double next = std::min(1.0, reached + step);
     const VecX between = start + next * (target - start);
-    Trial trial{states_, near_values_};
-    if (Newton(between, true, &trial) == Step::kDone) {
-      Accept(between, &trial);
+    trial_.states = states_;
+    trial_.near_values = near_values_;
+    if (Newton(between, true, &trial_) == Step::kDone) {
+      Accept(between, &trial_);
       reached = next;
       if (++easy >= 3) step = std::min(2 * step, 4.0 / first_steps);
       continue;

@@ -51,12 +51,16 @@ RunSummary ReferenceSolver::Dynamics(const CommandSample& command, ReferenceSamp
 
 ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
                           const ReferenceOptions& options,
-                          const std::function<void(size_t i, CommandSample* command)>& commands) {
+                          const std::function<void(size_t i, CommandSample* command)>& commands,
+                          Trace reuse) {
   const ComputingTime time;
-  ReferenceRun run;
+  ReferenceRun run{.trace = std::move(reuse), .summary = {}};
   run.trace.witness = role::kReference.name;
-  run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s),
-                  internal::ReferenceChannels(mechanism, motion, options.reactions));
+  run.trace.events.clear();
+  std::vector<Channel> channels =
+      run.trace.channels.empty() ? internal::ReferenceChannels(mechanism, motion, options.reactions)
+                                 : std::move(run.trace.channels);
+  run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
   ReferenceSolver solver(mechanism, motion, options);
   CommandSample command;
   ReferenceSample sample;

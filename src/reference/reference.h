@@ -83,9 +83,10 @@ struct ReferenceRun {
   RunSummary summary;
 };
 /// `commands` fills the values of the motion's commands at sample i, where they do not follow from
-/// its profiles (a motion that something else reached).
+/// its profiles (a motion that something else reached). `reuse`: the trace of an earlier run of the
+/// same mechanism, coordinates and options, whose channels and memory are taken over.
 [[nodiscard]] ReferenceRun RunReference(
     const Mechanism& mechanism, const Motion& motion, const ReferenceOptions& options = {},
-    const std::function<void(size_t i, CommandSample* command)>& commands = {});
+    const std::function<void(size_t i, CommandSample* command)>& commands = {}, Trace reuse = {});
 
 }  // namespace mbv

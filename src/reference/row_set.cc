@@ -51,10 +51,40 @@ void RowSet::CloseRow(double row_value, double row_bias, bool is_angle) {
 }
 
 void RowSet::Add(const ConstraintRows& rows, int count) {
+  if (rows.parent != 0 && rows.child != 0 && rows.parent != rows.child) {
+    AddBetween(rows, count);
+    return;
+  }
   for (int i = 0; i < count; ++i) {
     AddPiece(rows.parent, rows.J_parent.row(i));
     AddPiece(rows.child, rows.J_child.row(i));
     CloseRow(rows.residual[i], rows.bias[i], i >= rows.translation_rows);
+  }
+}
+
+// Two pieces a row, in the same order.
+void RowSet::AddBetween(const ConstraintRows& rows, int count) {
+  const bool parent_first = rows.parent < rows.child;
+  const auto &first = parent_first ? rows.J_parent : rows.J_child,
+             &second = parent_first ? rows.J_child : rows.J_parent;
+  const size_t pieces = body.size(), before = value.size(), more = static_cast<size_t>(count);
+  body.resize(pieces + 2 * more);
+  J.resize(pieces + 2 * more);
+  start.resize(before + more + 1);
+  value.resize(before + more);
+  bias.resize(before + more);
+  angular.resize(before + more);
+  for (size_t i = 0; i < more; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const size_t at = pieces + 2 * i;
+    body[at] = std::min(rows.parent, rows.child);
+    body[at + 1] = std::max(rows.parent, rows.child);
+    J[at] = first.row(row);
+    J[at + 1] = second.row(row);
+    start[before + i + 1] = static_cast<int>(at + 2);
+    value[before + i] = rows.residual[row];
+    bias[before + i] = rows.bias[row];
+    angular[before + i] = row >= rows.translation_rows ? 1 : 0;
   }
 }
 

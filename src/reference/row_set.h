@@ -44,6 +44,7 @@ struct RowSet {
   void AddWrenches(const VecX& force, std::vector<Vec6>* wrench_W) const;
 
  private:
+  void AddBetween(const ConstraintRows& rows, int count);
   void AddPiece(int body_index, const Vec6& J_piece);
   void CloseRow(double row_value, double row_bias, bool is_angle);
 };

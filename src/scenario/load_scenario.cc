@@ -839,6 +839,99 @@ YamlNodePtr ScenarioMemory::Set(const YamlNodePtr& root, const std::vector<SetVa
   return with;
 }
 
+namespace {
+
+// The unit of a key that is `word` with its unit behind; null where it is another key.
+const UnitSuffix* UnitOfKey(const std::string& key, std::string_view word) {
+  static constexpr UnitSuffix kUnits[] = {kPlain, kDeg, kMm};
+  if (!key.starts_with(word)) return nullptr;
+  const auto unit =
+      std::ranges::find(kUnits, std::string_view(key).substr(word.size()), &UnitSuffix::suffix);
+  return unit == std::end(kUnits) ? nullptr : unit;
+}
+
+// The number of a term that `path` names within its node.
+std::optional<CommandNumber> NumberOfTerm(const YamlNode& node, const std::string& path,
+                                          const ProfileTerm& term) {
+  using Field = CommandNumber::Field;
+  const bool constant = std::holds_alternative<ConstantTerm>(term);
+  if (path.empty()) {
+    if (!constant || !node.is_scalar()) return {};
+    return CommandNumber{.field = Field::kConstant, .to_si = kPlain.to_si};
+  }
+  if (!node.is_map() || node.entries.size() != 1) return {};
+  if (const UnitSuffix* unit = UnitOfKey(path, "value"); unit != nullptr && constant) {
+    return CommandNumber{.field = Field::kConstant, .to_si = unit->to_si};
+  }
+  constexpr std::string_view kSine = "sine.";
+  if (!path.starts_with(kSine) || !std::holds_alternative<SineTerm>(term)) return {};
+  const std::string key = path.substr(kSine.size());
+  for (const auto& [word, field] :
+       {std::pair{"amplitude", Field::kAmplitude}, std::pair{"phase", Field::kPhase},
+        std::pair{"frequency_hz", Field::kFrequency}, std::pair{"period_s", Field::kPeriod}}) {
+    const UnitSuffix* unit = UnitOfKey(key, word);
+    if (unit != nullptr) return CommandNumber{.field = field, .to_si = unit->to_si};
+  }
+  return {};
+}
+
+}  // namespace
+
+bool CommandNumber::Put(double value, Motion* motion) const {
+  if (!std::isfinite(value)) return false;
+  const bool positive = field == Field::kFrequency || field == Field::kPeriod;
+  if (positive && value <= 0.0) return false;
+  ProfileTerm& at = motion->commands[command].profile.terms[term];
+  const double si = to_si(value);
+  switch (field) {
+    case Field::kConstant:
+      std::get<ConstantTerm>(at).value = si;
+      break;
+    case Field::kAmplitude:
+      std::get<SineTerm>(at).amplitude = si;
+      break;
+    case Field::kPhase:
+      std::get<SineTerm>(at).phase_rad = si;
+      break;
+    case Field::kFrequency:
+      std::get<SineTerm>(at).frequency_hz = si;
+      break;
+    case Field::kPeriod:
+      std::get<SineTerm>(at).frequency_hz = 1.0 / si;
+      break;
+  }
+  return true;
+}
+
+// Commands come first in a motion, in the order of the file, and with one term each.
+std::optional<CommandNumber> ScenarioMemory::FindCommandNumber(const std::string& key,
+                                                               const Motion& motion) const {
+  constexpr std::string_view kCommands = "motion.commands.";
+  const YamlNode* section = root_ == nullptr ? nullptr : FindSetNode(*root_, "motion.commands");
+  if (section == nullptr || !section->is_map() || !key.starts_with(kCommands)) return {};
+  const std::string path = key.substr(kCommands.size());
+  const size_t length = FirstKey(*section, path, "commands");
+  const auto entry = std::ranges::find(section->entries, path.substr(0, length), &YamlEntry::key);
+  if (entry == section->entries.end()) return {};
+  const auto command = static_cast<size_t>(entry - section->entries.begin());
+  if (command >= motion.commands.size()) return {};
+  // One term for each item of a list.
+  const std::vector<ProfileTerm>& terms = motion.commands[command].profile.terms;
+  const YamlNode* node = entry->value.get();
+  ListStep step{0, length < path.size() ? path.substr(length + 1) : ""};
+  const size_t items = node->is_sequence() ? node->items.size() : 1;
+  if (terms.size() != items) return {};
+  if (node->is_sequence()) {
+    const auto first = FirstItem(node, step.rest);
+    if (!first) return {};
+    step = *first;
+    node = node->items[step.index].get();
+  }
+  auto number = NumberOfTerm(*node, step.rest, terms[step.index]);
+  if (number) number->command = command, number->term = step.index;
+  return number;
+}
+
 std::optional<std::string> ScenarioMemory::Find(const std::string& model, const fs::path& folder) {
   const auto known = models_.find(model);
   if (known != models_.end()) return known->second;

@@ -94,6 +94,20 @@ struct ScenarioHead {
 [[nodiscard]] Diagnostics ReadParameterOptions(const std::vector<SetValue>& values,
                                                LoadOptions* options);
 
+/// A number that --set names, where it stands in a scenario's motion: a constant of a command's
+/// profile, or one of a sine's numbers.
+struct CommandNumber {
+  enum class Field { kConstant, kAmplitude, kPhase, kFrequency, kPeriod };
+
+  size_t command = 0, term = 0;  ///< indices into Motion::commands and Profile::terms
+  Field field = Field::kConstant;
+  double (*to_si)(double value) = nullptr;  ///< from the key's unit
+
+  /// Writes a number in the key's unit. False, and nothing is written, where the reader of
+  /// scenarios refuses it.
+  [[nodiscard]] bool Put(double value, Motion* motion) const;
+};
+
 /// What loading a scenario file again with other numbers takes over from the loads before: files
 /// are read and parsed once, a model is loaded and its commands are counted again only where a set
 /// number changes it. Results are those without it. For one file, which does not change meanwhile,
@@ -105,6 +119,10 @@ class ScenarioMemory {
   /// SetValues(); where only numbers differ from the last call, they are replaced in its tree.
   [[nodiscard]] YamlNodePtr Set(const YamlNodePtr& root, const std::vector<SetValue>& values,
                                 YamlReader* reader);
+  /// Where the number of `key` stands in the motion that was loaded last, if that is all that
+  /// depends on it; else empty.
+  [[nodiscard]] std::optional<CommandNumber> FindCommandNumber(const std::string& key,
+                                                               const Motion& motion) const;
   /// FindModel() and LoadModel().
   [[nodiscard]] std::optional<std::string> Find(const std::string& model,
                                                 const std::filesystem::path& folder);

@@ -248,6 +248,18 @@ std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics,
   return prepared;
 }
 
+bool PrepareAgain(Prepared* prepared, Diagnostics* diagnostics) {
+  const Scenario& scenario = prepared->scenario;
+  if (scenario.analytic.equations.empty()) {
+    if (!prepared->has_closed_form()) return true;  // whatever the profiles
+    const ClosedFormRow* row = FindClosedForm(prepared->mechanisms.analytic.name);
+    if (row != nullptr && row->serves_any_profiles) return true;
+  }
+  prepared->closed_form =
+      MakeClosedForm(scenario, prepared->mechanisms.analytic, prepared->consent, diagnostics);
+  return !diagnostics->has_errors();
+}
+
 namespace {
 
 // Where a phase ends: poses, twists, and the coordinates of all joints with their turns.

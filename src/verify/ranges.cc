@@ -58,15 +58,17 @@ std::string RangeViolation::Text() const {
 std::vector<RangeViolation> DriveViolations(const Mechanism& mechanism, const Trace& trace) {
   std::vector<RangeViolation> violations;
   for (const Drive& drive : mechanism.drives) {
+    if (!IsBounded(drive.range)) continue;
     const int column = trace.Find(Quantity::kPosition, drive.name);
-    if (column < 0 || !IsBounded(drive.range)) continue;
-    RangeViolation worst{.what = "drive " + drive.name,
-                         .range = drive.range,
-                         .unit = PositionUnit(mechanism, drive)};
+    if (column < 0) continue;
+    RangeViolation worst{.what = {}, .range = drive.range, .unit = {}};
     for (size_t i = 0; i < trace.time_s.size(); ++i) {
       Visit(trace.values(static_cast<Eigen::Index>(i), column), trace.time_s[i], &worst);
     }
-    if (worst.amount > 0.0) violations.push_back(std::move(worst));
+    if (!(worst.amount > 0.0)) continue;
+    worst.what = "drive " + drive.name;
+    worst.unit = PositionUnit(mechanism, drive);
+    violations.push_back(std::move(worst));
   }
   return violations;
 }

@@ -318,6 +318,13 @@ void WitnessRunner::Add(const Role& role, RunSummary summary, Trace trace) {
   runs_.records.push_back({role.name, std::move(summary), std::move(trace)});
 }
 
+Trace WitnessRunner::Earlier(const Role& role) {
+  for (WitnessRecord& record : reuse_.records) {
+    if (record.name == role) return std::move(record.trace);
+  }
+  return {};
+}
+
 void WitnessRunner::LeaveOut(const Role& role, RunSummary why) { Add(role, std::move(why), {}); }
 
 void WitnessRunner::Warn(const std::string& text) {
@@ -334,8 +341,9 @@ void WitnessRunner::RunAnalytic() {
     runs_.records.back().required = scenario().analytic.required;
     return;
   }
-  ClosedFormRun run = RunClosedForm(prepared_.mechanisms.analytic, scenario().motion,
-                                    prepared_.closed_form.closed_form.get());
+  ClosedFormRun run =
+      RunClosedForm(prepared_.mechanisms.analytic, scenario().motion,
+                    prepared_.closed_form.closed_form.get(), Earlier(role::kAnalytic));
   runs_.timing.analytic_s = run.summary.wall_s;
   Add(role::kAnalytic, std::move(run.summary), std::move(run.trace));
   runs_.records.back().required = scenario().analytic.required;
@@ -354,7 +362,8 @@ void WitnessRunner::RunSolver() { Solve(role::kSolver); }
 
 void WitnessRunner::Solve(const Role& role) {
   if (scenario().motion.free()) return SolveFree(role);
-  ReferenceRun run = RunReference(prepared_.mechanisms.reference, scenario().motion);
+  ReferenceRun run =
+      RunReference(prepared_.mechanisms.reference, scenario().motion, {}, {}, Earlier(role));
   runs_.timing.reference_s = run.summary.wall_s;
   Add(role, std::move(run.summary), std::move(run.trace));
 }

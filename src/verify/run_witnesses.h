@@ -113,6 +113,10 @@ class WitnessRunner {
   explicit WitnessRunner(const Prepared& prepared, SimulatedSide side = {},
                          ProgressFunction progress = {});
 
+  /// Runs of the same scenario with other numbers in its commands: traces of the closed form and of
+  /// the reference take over their channels and memory.
+  void Reuse(WitnessRuns runs) { reuse_ = std::move(runs); }
+
   /// Whether the scenario has this witness. One that has a place but was switched off, or cannot
   /// do its part, takes part with a record that says so.
   [[nodiscard]] bool TakesPart(const Role& role) const;
@@ -156,6 +160,8 @@ class WitnessRunner {
   void LeaveOut(const Role& role, RunSummary why);
   void Add(const Role& role, RunSummary summary, Trace trace);
   void Warn(const std::string& text);
+  /// An earlier one of this witness; empty without one.
+  [[nodiscard]] Trace Earlier(const Role& role);
   void RunThose(bool following);
   /// Gave the simulation its motion; must have run.
   [[nodiscard]] const WitnessRecord& driver() const;
@@ -167,7 +173,7 @@ class WitnessRunner {
   const Prepared& prepared_;
   SimulatedSide side_;
   ProgressFunction progress_;
-  WitnessRuns runs_;
+  WitnessRuns runs_, reuse_;
 };
 
 /// What is compared, except for the witnesses and what statics leaves open; times are those of the

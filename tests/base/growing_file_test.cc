@@ -58,6 +58,29 @@ TEST(StreamFromChildren, GivesTextsInOrderForAnyNumberOfChildren) {
   }
 }
 
+// What was sent together with a death is lost; the children after it lose no other text.
+TEST(StreamFromChildren, TextsSentTogetherAreLostWithTheirChildAlone) {
+  const auto work = [](size_t i) {
+    if (i == 40) raise(SIGKILL);
+    return std::to_string(i);
+  };
+  for (const int parallel : {1, 3}) {
+    size_t given = 0, lost = 0;
+    bool after = false;
+    StreamFromChildren(2000, {.parallel = parallel, .timeout_s = 5.0, .together = true}, work,
+                       [&](size_t i, const std::optional<std::string>& text) {
+                         (text ? given : lost) += 1;
+                         if (text) EXPECT_EQ(*text, std::to_string(i));
+                         if (i == 40) EXPECT_FALSE(text);
+                         after = after || (i > 40 && !text);
+                         return true;
+                       });
+    EXPECT_EQ(given + lost, 2000u);
+    EXPECT_LE(lost, 42u) << parallel;
+    EXPECT_FALSE(after) << parallel;
+  }
+}
+
 TEST(ShareOut, GivesTheSameWithOneJobAndWithMany) {
   const auto shared = [](int jobs) {
     std::string all;

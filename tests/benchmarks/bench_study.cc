@@ -1,5 +1,6 @@
-// Cost of a study's point: the shipped platform at two samples, by the reference alone. `anew`
-// loads everything at each point, as `mbverify run --set` does; `memory` is what a study does.
+// Cost of a study's point: the shipped platform at two samples (`study`: three), by the reference
+// alone where nothing else is said. `anew` loads everything at each point, as `mbverify run --set`
+// does; `memory` is what a study of other machines does, `study` all of a study of poses.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -42,6 +43,32 @@ void PlatformPoint(benchmark::State& state, bool machine, bool in_memory) {
   }
 }
 
+// A point of a study that varies the pose alone, by one witness.
+void PlatformPose(benchmark::State& state, const std::string& witness) {
+  const ParsedDocuments documents;
+  Study study;
+  study.scenario = SourcePath("/scenarios/stabilizing_platform/random.yaml");
+  for (const char* command : {"roll", "pitch", "heave"}) {
+    study.factors.push_back({.name = command,
+                             .key = fmt::format("motion.commands.{}.sine.phase_deg", command),
+                             .axis = {0.0, Uniform{0.0, 360.0}}});
+  }
+  study.design = {.kind = DesignKind::kSobol, .count = 1 << 16};
+  study.witnesses = {witness};
+  study.quantities = {{.name = "limb1.drive.force.max", .channel = "limb1.drive.force"}};
+  Diagnostics diagnostics;
+  int exit_code = 0;
+  const auto bench = StudyBench::Make(study, &diagnostics, &exit_code);
+  MBV_DEMAND(bench != nullptr && bench->keeps(), diagnostics.Text());
+  std::uint64_t number = kBandPoints;
+  for (auto _ : state) {
+    number = number + 1 < study.design.count ? number + 1 : kBandPoints;
+    benchmark::DoNotOptimize(PointLine(bench->Run(number).row, study));
+  }
+}
+
+BENCHMARK_CAPTURE(PlatformPose, study_analytic, "analytic")->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(PlatformPose, study_reference, "reference")->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(PlatformPoint, pose_anew, false, false)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(PlatformPoint, pose_memory, false, true)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(PlatformPoint, machine_anew, true, false)->Unit(benchmark::kMicrosecond);

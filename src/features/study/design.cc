@@ -167,7 +167,8 @@ void DesignPoints::Correlate(const std::vector<double>& shares, std::vector<doub
   }
 }
 
-// Where the point lies in the unit cube.
+// Where the point lies in the unit cube. Blocks are dealt to the replicates in turn, each of which
+// is Sobol's sequence from its beginning with shifts of its own.
 std::vector<double> DesignPoints::Shares(std::uint64_t number) const {
   const size_t axes = axes_.size();
   std::vector<double> shares(axes);
@@ -180,11 +181,17 @@ std::vector<double> DesignPoints::Shares(std::uint64_t number) const {
     return shares;
   }
   const bool blocks = design_.kind == DesignKind::kSaltelli;
-  const std::uint64_t block = blocks ? axes + 2 : 1, place = number % block;
-  const std::vector<std::uint64_t> bits = sequence_->At(number / block);
+  if (!blocks) {
+    const std::vector<std::uint64_t> bits = sequence_->At(number);
+    for (size_t d = 0; d < axes; ++d) shares[d] = ShareOf(bits[d] ^ MixBits(design_.seed, d));
+    return shares;
+  }
+  const std::uint64_t block = number / (axes + 2), place = number % (axes + 2);
+  const std::uint64_t replicate = block % kReplicates;
+  const std::vector<std::uint64_t> bits = sequence_->At(block / kReplicates);
   for (size_t d = 0; d < axes; ++d) {
     const size_t column = place == 1 || place == d + 2 ? axes + d : d;  // of A, or of B
-    shares[d] = ShareOf(bits[column] ^ MixBits(design_.seed, column));
+    shares[d] = ShareOf(bits[column] ^ MixBits(design_.seed, replicate, column));
   }
   return shares;
 }

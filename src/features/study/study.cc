@@ -628,9 +628,11 @@ class StudyProgress {
   explicit StudyProgress(std::string name) : name_(std::move(name)) {}
 
   void Report(std::uint64_t done, std::uint64_t all, double cpu_s) {
-    constexpr double kBetween_s = 30.0;
+    constexpr double kBetween_s = 30.0, kOften_s = 0.1;
     if (first_ == 0) first_ = done;
     const double elapsed = Since(start_);
+    if (done < all && elapsed - shown_s_ < (line_.active() ? kOften_s : kBetween_s)) return;
+    shown_s_ = elapsed;
     const double left = done > first_ ? elapsed / static_cast<double>(done - first_) *
                                             static_cast<double>(all - done)
                                       : 0.0;
@@ -638,9 +640,8 @@ class StudyProgress {
                                          name_, done, all, 1e3 * cpu_s);
     if (line_.active()) {
       line_.Show(text, static_cast<double>(done) / static_cast<double>(all));
-    } else if (Since(reported_) > kBetween_s) {
+    } else if (elapsed > kBetween_s) {
       Say(stderr, "{}, {} left\n", text, done > first_ ? TimeText(left) : "?");
-      reported_ = StudyClock::now();
     }
   }
 
@@ -651,7 +652,8 @@ class StudyProgress {
 
   std::string name_;
   ProgressLine line_{true};
-  StudyClock::time_point start_ = StudyClock::now(), reported_ = start_;
+  StudyClock::time_point start_ = StudyClock::now();
+  double shown_s_ = 0.0;  // after the start
   std::uint64_t first_ = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <ctime>
@@ -54,22 +55,13 @@ bool LimitsSamples(const Study& study) {
   });
 }
 
-// Not moved: the run refers to what was prepared.
-void Try(const Study& study, const std::vector<SetValue>& sets, ScenarioMemory* memory,
-         Attempt* attempt, PointRow* row) {
+// What a run says of a study's quantities.
+void Measure(const Study& study, const StudyRun& run, PointRow* row) {
   row->values.assign(study.quantities.size(), kNan);
-  attempt->prepared =
-      Prepare(LoadScenario(study.scenario, {.set = sets}, memory), &attempt->diagnostics);
-  if (!attempt->prepared) {
-    row->exit_code = 2;
-    row->reason = FirstErrorText(attempt->diagnostics);
-    return;
-  }
-  attempt->run = RunStudyWitnesses(*attempt->prepared, study.witnesses);
-  row->reason = attempt->run.failure;
+  row->reason = run.failure;
   std::optional<Verdict> verdict;
   if (row->reason.empty()) {
-    StudyMeasures measures = MeasureQuantities(attempt->run, study.quantities);
+    StudyMeasures measures = MeasureQuantities(run, study.quantities);
     row->values = std::move(measures.values);
     verdict = measures.verdict;
     for (size_t k = 0; k < row->values.size() && row->reason.empty(); ++k) {
@@ -77,11 +69,26 @@ void Try(const Study& study, const std::vector<SetValue>& sets, ScenarioMemory* 
     }
     if (row->reason.empty() && verdict == Verdict::kNotRun) row->reason = measures.reason;
     if (row->reason.empty() && LimitsSamples(study)) {
-      row->reason = UnresolvedBySamples(attempt->run);
+      row->reason = UnresolvedBySamples(run);
       if (!row->reason.empty()) row->values.assign(study.quantities.size(), kNan);
     }
   }
   row->exit_code = !row->reason.empty() ? 3 : verdict == Verdict::kDisagree ? 1 : 0;
+}
+
+// Not moved: the run refers to what was prepared.
+void Try(const Study& study, const std::vector<SetValue>& sets, ScenarioMemory* memory,
+         Attempt* attempt, PointRow* row) {
+  attempt->prepared =
+      Prepare(LoadScenario(study.scenario, {.set = sets}, memory), &attempt->diagnostics);
+  if (!attempt->prepared) {
+    row->values.assign(study.quantities.size(), kNan);
+    row->exit_code = 2;
+    row->reason = FirstErrorText(attempt->diagnostics);
+    return;
+  }
+  attempt->run = RunStudyWitnesses(*attempt->prepared, study.witnesses);
+  Measure(study, attempt->run, row);
 }
 
 // The drive forces that the first witness records; at times of `only`, if that is given.
@@ -126,10 +133,8 @@ std::vector<float> ForceSamples(const StudyForces& forces, const Trace* trace) {
   return samples;
 }
 
-const Trace* FirstTrace(const Attempt& attempt) {
-  return attempt.run.failure.empty() && !attempt.run.witnesses.empty()
-             ? &attempt.run.witnesses.front()->trace
-             : nullptr;
+const Trace* FirstTrace(const StudyRun& run) {
+  return run.failure.empty() && !run.witnesses.empty() ? &run.witnesses.front()->trace : nullptr;
 }
 
 // The reference alone needs no closed form: it is then not made for each point, where nothing in
@@ -147,6 +152,43 @@ Finding FindingAt(const Study& study, int line, int column, std::string message,
 }
 
 }  // namespace
+
+// Where points differ in numbers of commands alone, everything else stays prepared, and the traces
+// of a point take the place of those of the point before.
+struct StudyBench::Kept {
+  std::vector<CommandNumber> numbers;  // per factor
+  Prepared prepared;
+  StudyRun run;
+
+  // False where such numbers have to be read to say what is wrong with them.
+  [[nodiscard]] bool Put(const std::vector<double>& varied) {
+    Diagnostics diagnostics;
+    for (size_t k = 0; k < varied.size(); ++k) {
+      if (!numbers[k].Put(varied[k], &prepared.scenario.motion)) return false;
+    }
+    return PrepareAgain(&prepared, &diagnostics);
+  }
+};
+
+StudyBench::StudyBench(Study study) : study_(std::move(study)), points_(study_.Points()) {}
+StudyBench::~StudyBench() = default;
+
+void StudyBench::Keep() {
+  Diagnostics diagnostics;
+  auto prepared = Prepare(
+      LoadScenario(study_.scenario, {.set = SetsOfPoint(points_.At(0))}, &memory_), &diagnostics);
+  if (!prepared || prepared->scenario.phase) return;
+  auto kept = std::make_unique<Kept>(
+      Kept{.numbers = {}, .prepared = *std::move(prepared), .run = {.runs = {}, .failure = {}}});
+  const Motion& motion = kept->prepared.scenario.motion;
+  if (motion.free()) return;  // it may begin where its commands are
+  for (const Factor& factor : study_.factors) {
+    const auto number = memory_.FindCommandNumber(factor.key, motion);
+    if (!number) return;
+    kept->numbers.push_back(*number);
+  }
+  kept_ = std::move(kept);
+}
 
 std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* diagnostics,
                                              int* exit_code) {
@@ -191,8 +233,9 @@ std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* di
   if (diagnostics->has_errors()) return nullptr;
   bench->Measure(*attempt.prepared, attempt.run, diagnostics);
   if (diagnostics->has_errors()) return nullptr;
-  bench->nominal_.forces = ForceSamples(bench->forces_, FirstTrace(attempt));
+  bench->nominal_.forces = ForceSamples(bench->forces_, FirstTrace(attempt.run));
   bench->without_closed_form_ = NeedsNoClosedForm(study, *attempt.prepared);
+  bench->Keep();
   bench->inputs_ = watch.files();
   *exit_code = 0;
   return bench;
@@ -334,9 +377,18 @@ StudyPoint StudyBench::Run(std::uint64_t number) const {
   StudyPoint point;
   point.row.point = number;
   point.row.varied = points_.At(number);
+  const auto take_forces = [&](const StudyRun& run) {
+    if (number < kBandPoints) point.forces = ForceSamples(forces_, FirstTrace(run));
+  };
+  if (kept_ != nullptr && kept_->Put(point.row.varied)) {
+    kept_->run = RunStudyWitnesses(kept_->prepared, study_.witnesses, std::move(kept_->run.runs));
+    mbv::Measure(study_, kept_->run, &point.row);
+    take_forces(kept_->run);
+    return point;
+  }
   Attempt attempt;
   Try(study_, SetsOfPoint(point.row.varied), &memory_, &attempt, &point.row);
-  point.forces = ForceSamples(forces_, FirstTrace(attempt));
+  take_forces(attempt.run);
   return point;
 }
 
@@ -347,7 +399,7 @@ StudyPoint StudyBench::Lost(std::uint64_t number, const std::string& reason) con
                .reason = reason,
                .varied = points_.At(number),
                .values = std::vector<double>(study_.quantities.size(), kNan)};
-  point.forces = ForceSamples(forces_, nullptr);
+  if (number < kBandPoints) point.forces = ForceSamples(forces_, nullptr);
   return point;
 }
 
@@ -363,7 +415,6 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string BytesOfForces(const StudyPoint& point) {
-  if (point.row.point >= kBandPoints) return "";
   return {reinterpret_cast<const char*>(point.forces.data()), point.forces.size() * sizeof(float)};
 }
 
@@ -378,6 +429,36 @@ std::optional<std::string> Again(const std::function<std::string(size_t)>& work,
                                  double timeout_s) {
   return InChildren(1, timeout_s, [&](size_t) { return work(point); }).front();
 }
+
+// Rows that come fast are written together: a kill loses those of a tenth of a second.
+class PendingRows {
+ public:
+  PendingRows(GrowingFile* csv, GrowingFile* forces) : csv_(*csv), forces_(*forces) {}
+
+  void Add(std::string_view line, std::string_view force_bytes) {
+    lines_ += line;
+    bytes_ += force_bytes;
+  }
+  [[nodiscard]] bool due() const {
+    constexpr size_t kMostBytes = 1 << 16;
+    return lines_.size() + bytes_.size() > kMostBytes ||
+           std::chrono::steady_clock::now() - written_ > std::chrono::milliseconds(100);
+  }
+  // "" or what went wrong.
+  [[nodiscard]] std::string Write() {
+    std::string trouble = forces_.Append(bytes_);  // first: a row has its forces
+    if (trouble.empty()) trouble = csv_.Append(lines_);
+    bytes_.clear();
+    lines_.clear();
+    written_ = std::chrono::steady_clock::now();
+    return trouble;
+  }
+
+ private:
+  GrowingFile &csv_, &forces_;
+  std::string lines_, bytes_;
+  std::chrono::steady_clock::time_point written_ = std::chrono::steady_clock::now();
+};
 
 std::uint64_t FileSize(const fs::path& path) {
   std::error_code error;
@@ -426,30 +507,30 @@ std::string ComputePoints(const StudyBench& bench, const PointsOptions& options,
   };
   const std::string lost =
       fmt::format("ended by a crash, or not finished after {:g} s", options.timeout_s);
+  PendingRows pending(&csv, &forces);
   double cpu_s = 0.0;
-  const auto take = [&](size_t i, std::optional<std::string> text) {
-    std::string line, bytes;
-    if (!text) text = Again(work, i, options.timeout_s);
-    if (text) {
+  const auto take = [&](size_t i, const std::optional<std::string>& from_child) {
+    const auto again = from_child ? std::nullopt : Again(work, i, options.timeout_s);
+    if (const auto& text = from_child ? from_child : again) {
       double of_point_s = 0.0;
       std::memcpy(&of_point_s, text->data(), sizeof of_point_s);
       cpu_s += of_point_s;
-      const size_t end = text->find('\n', sizeof of_point_s) + 1;
-      line = text->substr(sizeof of_point_s, end - sizeof of_point_s);
-      bytes = text->substr(end);
+      const std::string_view rest = std::string_view(*text).substr(sizeof of_point_s);
+      const size_t end = rest.find('\n') + 1;
+      pending.Add(rest.substr(0, end), rest.substr(end));
     } else {
       const StudyPoint point = bench.Lost(number(i), lost);
-      line = PointLine(point.row, bench.study());
-      bytes = BytesOfForces(point);
+      pending.Add(PointLine(point.row, bench.study()), BytesOfForces(point));
     }
-    trouble = forces.Append(bytes);  // first: a row has its forces
-    if (trouble.empty()) trouble = csv.Append(line);
+    if (pending.due()) trouble = pending.Write();
     if (options.progress)
       options.progress(done.rows + i + 1, all, cpu_s / static_cast<double>(i + 1));
     return trouble.empty();
   };
-  StreamFromChildren(all - done.rows, {.parallel = options.jobs, .timeout_s = options.timeout_s},
+  StreamFromChildren(all - done.rows,
+                     {.parallel = options.jobs, .timeout_s = options.timeout_s, .together = true},
                      work, take);
+  if (trouble.empty()) trouble = pending.Write();
   if (trouble.empty()) trouble = forces.Finish();
   return trouble.empty() ? csv.Finish() : trouble;
 }
@@ -573,9 +654,11 @@ double StatisticOf(const VecX& samples, Statistic statistic) {
   return kNan;
 }
 
-StudyRun RunStudyWitnesses(const Prepared& prepared, const std::vector<std::string>& names) {
+StudyRun RunStudyWitnesses(const Prepared& prepared, const std::vector<std::string>& names,
+                           WitnessRuns reuse) {
   StudyRun result{.prepared = &prepared, .runs = {}, .failure = {}};
   WitnessRunner runner(prepared);
+  runner.Reuse(std::move(reuse));
   const auto ran = [&](const Role& role) { return runner.runs().Find(role) != nullptr; };
   for (const std::string& name : names) {
     const Role& role = RoleOfWitness(name);

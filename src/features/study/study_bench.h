@@ -40,7 +40,8 @@ struct MeasuredForces {
 
 struct StudyPoint {
   PointRow row;
-  std::vector<float> forces;  ///< drives × times; NaN where there are none
+  /// Drives × times; NaN where there are none. Empty of points from kBandPoints on.
+  std::vector<float> forces;
 };
 
 class StudyBench {
@@ -49,6 +50,8 @@ class StudyBench {
   /// after bad input (exit code 2) or where it cannot run (3).
   [[nodiscard]] static std::unique_ptr<StudyBench> Make(const Study& study,
                                                         Diagnostics* diagnostics, int* exit_code);
+
+  ~StudyBench();
 
   [[nodiscard]] const Study& study() const { return study_; }
   [[nodiscard]] const DesignPoints& points() const { return points_; }
@@ -65,6 +68,8 @@ class StudyBench {
   /// That of the same study with another number of drawn points.
   [[nodiscard]] std::string FingerprintOf(std::uint64_t count) const;
 
+  /// Whether points differ in numbers of commands alone, so that no file is read for them again.
+  [[nodiscard]] bool keeps() const { return kept_ != nullptr; }
   /// A function of the study and the number alone.
   [[nodiscard]] StudyPoint Run(std::uint64_t number) const;
   /// Finds which numbers move which quantities, by setting each alone to its ends, in a child
@@ -78,7 +83,9 @@ class StudyBench {
   [[nodiscard]] std::string Command(const std::vector<double>& varied) const;
 
  private:
-  explicit StudyBench(Study study) : study_(std::move(study)), points_(study_.Points()) {}
+  struct Kept;
+  explicit StudyBench(Study study);
+  void Keep();
   [[nodiscard]] std::vector<SetValue> SetsOf(const std::vector<double>& varied) const;
   [[nodiscard]] std::vector<SetValue> SetsOfPoint(const std::vector<double>& varied) const;
   [[nodiscard]] std::string MovedBy(size_t factor) const;
@@ -88,6 +95,7 @@ class StudyBench {
 
   Study study_;
   mutable ScenarioMemory memory_;
+  std::unique_ptr<Kept> kept_;  // null where more than numbers of commands is varied
   DesignPoints points_;
   StudyPoint nominal_;
   StudyForces forces_;
@@ -151,9 +159,11 @@ struct StudyRun {
   std::vector<const WitnessRecord*> witnesses = {};  ///< those named, in their order
   std::string failure;  ///< why there is nothing to measure; "" otherwise
 };
-/// `prepared` must outlive the result.
+/// `prepared` must outlive the result. `reuse`: runs that are not needed any more, of a scenario
+/// that differs in numbers of its commands alone.
 [[nodiscard]] StudyRun RunStudyWitnesses(const Prepared& prepared,
-                                         const std::vector<std::string>& names);
+                                         const std::vector<std::string>& names,
+                                         WitnessRuns reuse = {});
 
 /// What `--set` says of the simulation's mode for these witnesses; "" for the scenario's own.
 [[nodiscard]] std::string ModeOf(const std::vector<std::string>& names);

@@ -227,8 +227,8 @@ ReportSection Indices(const StudyReport& report, const std::vector<StudyPlot>& p
   if (section.blocks.empty()) return section;
   section.Note(
       "Shares of the variance: first order of the number alone, total with all that it does "
-      "together with others. Saltelli's and Jansen's estimators; intervals by bootstrap of "
-      "blocks.");
+      "together with others. Saltelli's and Jansen's estimators; intervals by how far independent "
+      "replicates of the design lie apart.");
   return section;
 }
 

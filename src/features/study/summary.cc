@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/binomial.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <charconv>
 #include <cmath>
-#include <random>
 
 #include "base/demand.h"
 #include "base/text.h"
@@ -49,8 +50,11 @@ Histogram HistogramOf(std::span<const double> sorted) {
 
 namespace {
 
-constexpr int kReplicates = 400;
-constexpr std::uint64_t kBootstrapSeed = 20260101;
+// What a block a, b, ab_0, ab_1 … adds to the parts of number i.
+double FirstOf(const double* block, size_t i) { return block[1] * (block[2 + i] - block[0]); }
+double TotalOf(const double* block, size_t i) {
+  return 0.5 * (block[0] - block[2 + i]) * (block[0] - block[2 + i]);
+}
 
 // Sums over blocks, from which all estimates follow.
 struct BlockSums {
@@ -62,9 +66,8 @@ struct BlockSums {
     sum += a + b;
     squares += a * a + b * b;
     for (size_t i = 0; i < first.size(); ++i) {
-      const double ab = block[2 + i];
-      first[i] += b * (ab - a);
-      total[i] += 0.5 * (a - ab) * (a - ab);
+      first[i] += FirstOf(block, i);
+      total[i] += TotalOf(block, i);
     }
     ++count;
   }
@@ -81,46 +84,52 @@ struct BlockSums {
   size_t count = 0;
 };
 
-// The values of complete blocks, less their mean.
-std::vector<double> CentredBlocks(std::span<const double> values, size_t width, double* mean) {
-  std::vector<double> kept;
-  double sum = 0.0;
-  for (size_t at = 0; at + width <= values.size(); at += width) {
-    const std::span<const double> block = values.subspan(at, width);
-    if (!std::all_of(block.begin(), block.end(), [](double v) { return std::isfinite(v); })) {
-      continue;
+// Complete blocks, their values less the mean.
+struct CentredBlocks {
+  CentredBlocks(std::span<const double> all, size_t block_width) : width(block_width) {
+    double sum = 0.0;
+    for (size_t n = 0; (n + 1) * width <= all.size(); ++n) {
+      const std::span<const double> block = all.subspan(n * width, width);
+      if (!std::ranges::all_of(block, [](double v) { return std::isfinite(v); })) continue;
+      values.insert(values.end(), block.begin(), block.end());
+      replicate.push_back(n % kReplicates);
+      sum += block[0] + block[1];
     }
-    kept.insert(kept.end(), block.begin(), block.end());
-    sum += block[0] + block[1];
+    mean = sum / (2.0 * static_cast<double>(count()));
+    for (double& value : values) value -= mean;
   }
-  *mean = sum * static_cast<double>(width) / (2.0 * static_cast<double>(kept.size()));
-  for (double& value : kept) value -= *mean;
-  return kept;
-}
 
-Interval MiddleOf(std::vector<double> replicates) {
-  std::sort(replicates.begin(), replicates.end());
-  return {Percentile(replicates, 0.025), Percentile(replicates, 0.975)};
-}
+  [[nodiscard]] size_t count() const { return replicate.size(); }
+  [[nodiscard]] const double* At(size_t n) const { return &values[n * width]; }
 
-// Whole blocks are drawn again and again, with replacement.
-void Bootstrap(const std::vector<double>& blocks, size_t width, std::vector<SobolIndex>* indices) {
-  const size_t numbers = width - 2, count = blocks.size() / width;
-  std::vector<std::vector<double>> first(numbers), total(numbers);
-  std::mt19937_64 random(kBootstrapSeed);
-  for (int k = 0; k < kReplicates; ++k) {
-    BlockSums sums(numbers);
-    for (size_t n = 0; n < count; ++n) sums.Add(&blocks[width * (random() % count)]);
-    if (!(sums.variance() > 0.0)) continue;
-    for (size_t i = 0; i < numbers; ++i) {
-      first[i].push_back(sums.Share(sums.first[i]));
-      total[i].push_back(sums.Share(sums.total[i]));
-    }
+  size_t width;
+  double mean = kNan;
+  std::vector<double> values;
+  std::vector<size_t> replicate;  // per block
+};
+
+// 95 %, of a ratio of means S = Σ f/Σ v: each replicate's share of Σ (f − S v)/Σ v, whose sum is 0,
+// is an independent error of S to the first order, and Student's t says how often so few of them
+// stray how far.
+template <typename Numerator>
+Interval IntervalOf(double ratio, const CentredBlocks& blocks, const Numerator& f) {
+  std::array<double, kReplicates> error{};
+  std::array<bool, kReplicates> has{};
+  double all = 0.0;
+  for (size_t n = 0; n < blocks.count(); ++n) {
+    const double* block = blocks.At(n);
+    const double v = 0.5 * (block[0] * block[0] + block[1] * block[1]);
+    error[blocks.replicate[n]] += f(block) - ratio * v;
+    has[blocks.replicate[n]] = true;
+    all += v;
   }
-  for (size_t i = 0; i < numbers; ++i) {
-    (*indices)[i].first_interval = MiddleOf(std::move(first[i]));
-    (*indices)[i].total_interval = MiddleOf(std::move(total[i]));
-  }
+  const auto replicates = static_cast<double>(std::ranges::count(has, true));
+  if (replicates < 2.0) return {};
+  double squares = 0.0;
+  for (const double e : error) squares += e / all * (e / all);
+  const double deviation = std::sqrt(squares * replicates / (replicates - 1.0));
+  const double t = boost::math::quantile(boost::math::students_t(replicates - 1.0), 0.975);
+  return {ratio - t * deviation, ratio + t * deviation};
 }
 
 }  // namespace
@@ -130,75 +139,103 @@ SobolResult SobolIndices(std::span<const double> values, size_t numbers) {
   MBV_DEMAND(numbers > 0 && values.size() % width == 0, values.size());
   SobolResult result;
   result.indices.resize(numbers);
-  const std::vector<double> blocks = CentredBlocks(values, width, &result.mean);
-  result.blocks = blocks.size() / width;
+  const CentredBlocks blocks(values, width);
+  result.mean = blocks.mean;
+  result.blocks = blocks.count();
   result.left_out = values.size() / width - result.blocks;
   if (result.blocks < 2) return result;
   BlockSums sums(numbers);
-  for (size_t at = 0; at < blocks.size(); at += width) sums.Add(&blocks[at]);
+  for (size_t n = 0; n < result.blocks; ++n) sums.Add(blocks.At(n));
   result.variance = sums.variance();
   // Round-off of a constant is no variance.
   constexpr double kRoundoff = 1e-14;
   const double scale = kRoundoff * std::abs(result.mean);
   if (!(result.variance > scale * scale)) return result;
   for (size_t i = 0; i < numbers; ++i) {
-    result.indices[i].first = sums.Share(sums.first[i]);
-    result.indices[i].total = sums.Share(sums.total[i]);
+    SobolIndex& index = result.indices[i];
+    index.first = sums.Share(sums.first[i]);
+    index.total = sums.Share(sums.total[i]);
+    index.first_interval =
+        IntervalOf(index.first, blocks, [i](const double* block) { return FirstOf(block, i); });
+    index.total_interval =
+        IntervalOf(index.total, blocks, [i](const double* block) { return TotalOf(block, i); });
   }
-  Bootstrap(blocks, width, &result.indices);
   return result;
 }
 
 namespace {
 
-// In quotes where a comma or a quote would be mistaken; lines stay lines.
-std::string NumberField(double value) {
-  return std::isfinite(value) ? fmt::format("{:.17g}", value) : "";
+// In 17 digits, as "{:.17g}"; nothing for what is not a number.
+void AppendNumber(double value, std::string* text) {
+  if (!std::isfinite(value)) return;
+  std::array<char, 32> digits;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
+                                 std::chars_format::general, 17);
+  MBV_DEMAND(end.ec == std::errc(), value);
+  text->append(digits.data(), end.ptr);
 }
 
-// The next field of `line`, which is cut off; empty at the end and where quotes are not closed.
-std::optional<std::string> TakeField(std::string_view* line, bool* more) {
-  if (!*more) return {};
-  std::string field;
-  size_t at = 0;
-  if (!line->empty() && line->front() == '"') {
-    for (at = 1;; ++at) {
-      if (at >= line->size()) return {};
-      if ((*line)[at] == '"' && (at + 1 >= line->size() || (*line)[at + 1] != '"')) break;
-      if ((*line)[at] == '"') ++at;
-      field += (*line)[at];
+// The fields of a row, one after the other.
+class RowFields {
+ public:
+  explicit RowFields(std::string_view line) : line_(line) {}
+
+  // False where fields remain.
+  [[nodiscard]] bool done() const { return !more_; }
+  // Empty at the end and where quotes are not closed. Until the next call.
+  std::optional<std::string_view> Next() {
+    if (!more_) return {};
+    if (!line_.empty() && line_.front() == '"') return Quoted();
+    const size_t end = std::min(line_.find(','), line_.size());
+    const std::string_view field = line_.substr(0, end);
+    return Advance(end) ? std::optional(field) : std::nullopt;
+  }
+  template <typename Number>
+  std::optional<Number> NextNumber() {
+    const auto field = Next();
+    Number number{};
+    if (!field) return {};
+    const char* end = field->data() + field->size();
+    const auto [at, error] = std::from_chars(field->data(), end, number);
+    if (error != std::errc() || at != end) return {};
+    return number;
+  }
+  // Empty fields are NaN.
+  bool NextNumbers(size_t count, std::vector<double>* numbers) {
+    numbers->reserve(count);
+    for (size_t k = 0; k < count; ++k) {
+      const bool empty = line_.empty() || line_.front() == ',';
+      const auto number = empty && Next() ? std::optional(kNan) : NextNumber<double>();
+      if (!number) return false;
+      numbers->push_back(*number);
     }
-    ++at;
-  } else {
-    at = std::min(line->find(','), line->size());
-    field = line->substr(0, at);
+    return true;
   }
-  *more = at < line->size() && (*line)[at] == ',';
-  if (!*more && at < line->size()) return {};
-  line->remove_prefix(*more ? at + 1 : at);
-  return field;
-}
 
-template <typename Number>
-std::optional<Number> NumberOf(const std::optional<std::string>& field) {
-  Number number{};
-  if (!field) return {};
-  const char* end = field->data() + field->size();
-  const auto [at, error] = std::from_chars(field->data(), end, number);
-  if (error != std::errc() || at != end) return {};
-  return number;
-}
-
-bool TakeNumbers(std::string_view* line, bool* more, size_t count, std::vector<double>* numbers) {
-  for (size_t k = 0; k < count; ++k) {
-    const auto field = TakeField(line, more);
-    if (!field) return false;
-    const auto number = field->empty() ? kNan : NumberOf<double>(field);
-    if (!number) return false;
-    numbers->push_back(*number);
+ private:
+  std::optional<std::string_view> Quoted() {
+    unquoted_.clear();
+    size_t at = 1;
+    for (;; ++at) {
+      if (at >= line_.size()) return {};
+      if (line_[at] == '"' && (at + 1 >= line_.size() || line_[at + 1] != '"')) break;
+      if (line_[at] == '"') ++at;
+      unquoted_ += line_[at];
+    }
+    return Advance(at + 1) ? std::optional<std::string_view>(unquoted_) : std::nullopt;
   }
-  return true;
-}
+  // Over the comma at `at`; false where there is something else.
+  bool Advance(size_t at) {
+    more_ = at < line_.size() && line_[at] == ',';
+    if (!more_ && at < line_.size()) return false;
+    line_.remove_prefix(more_ ? at + 1 : at);
+    return true;
+  }
+
+  std::string_view line_;
+  bool more_ = true;
+  std::string unquoted_;
+};
 
 }  // namespace
 
@@ -212,22 +249,28 @@ std::string PointHeader(const Study& study) {
 std::string PointLine(const PointRow& row, const Study& study) {
   std::string text =
       fmt::format("{},{},{},{}", row.point, study.design.seed, row.exit_code, CsvCell(row.reason));
-  for (const double value : row.varied) text += "," + NumberField(value);
-  for (const double value : row.values) text += "," + NumberField(value);
-  return text + "\n";
+  for (const std::vector<double>* numbers : {&row.varied, &row.values}) {
+    for (const double value : *numbers) {
+      text += ',';
+      AppendNumber(value, &text);
+    }
+  }
+  text += '\n';
+  return text;
 }
 
 std::optional<PointRow> ReadPointLine(std::string_view line, const Study& study) {
-  bool more = true;
-  const auto point = NumberOf<std::uint64_t>(TakeField(&line, &more));
-  const auto seed = NumberOf<std::uint64_t>(TakeField(&line, &more));
-  const auto exit_code = NumberOf<int>(TakeField(&line, &more));
-  const auto reason = TakeField(&line, &more);
+  RowFields fields(line);
+  const auto point = fields.NextNumber<std::uint64_t>();
+  const auto seed = fields.NextNumber<std::uint64_t>();
+  const auto exit_code = fields.NextNumber<int>();
+  const auto reason = fields.Next();
   if (!point || seed != study.design.seed || !exit_code || !reason) return {};
-  PointRow row{.point = *point, .exit_code = *exit_code, .reason = *reason, .varied = {}};
-  if (!TakeNumbers(&line, &more, study.factors.size(), &row.varied)) return {};
-  if (!TakeNumbers(&line, &more, study.quantities.size(), &row.values)) return {};
-  if (more) return {};
+  PointRow row{
+      .point = *point, .exit_code = *exit_code, .reason = std::string(*reason), .varied = {}};
+  if (!fields.NextNumbers(study.factors.size(), &row.varied)) return {};
+  if (!fields.NextNumbers(study.quantities.size(), &row.values)) return {};
+  if (!fields.done()) return {};
   return row;
 }
 

@@ -43,7 +43,7 @@ struct Histogram {
 struct SobolIndex {
   double first = kNan;  ///< share of the variance that goes when this number alone is known
   double total = kNan;  ///< share that is left when all others are known
-  Interval first_interval, total_interval;  ///< 95 %, bootstrap of blocks
+  Interval first_interval, total_interval;  ///< 95 %, from replicates (kReplicates)
 };
 
 struct SobolResult {

@@ -14,10 +14,10 @@ namespace {
 
 using Function = std::function<double(const std::vector<double>&)>;
 
-std::vector<double> Evaluate(const Function& f, size_t numbers, Uniform range,
-                             std::uint64_t count) {
+std::vector<double> Evaluate(const Function& f, size_t numbers, Uniform range, std::uint64_t count,
+                             std::uint64_t seed = 1) {
   const DesignPoints points(std::vector<Axis>(numbers, {0.0, range}),
-                            {.kind = DesignKind::kSaltelli, .count = count});
+                            {.kind = DesignKind::kSaltelli, .count = count, .seed = seed});
   std::vector<double> values;
   for (std::uint64_t i = 0; i < points.count(); ++i) values.push_back(f(points.At(i)));
   return values;
@@ -42,7 +42,7 @@ IshigamiTruth TruthOfIshigami() {
 constexpr double kPi = std::numbers::pi;
 
 TEST(SobolIndices, FindThoseOfIshigamisFunction) {
-  const auto result = SobolIndices(Evaluate(Ishigami, 3, {-kPi, kPi}, 4096), 3);
+  const auto result = SobolIndices(Evaluate(Ishigami, 3, {-kPi, kPi}, 65536), 3);
   const IshigamiTruth truth = TruthOfIshigami();
   EXPECT_NEAR(result.mean, 3.5, 0.01);
   EXPECT_NEAR(result.variance, truth.variance, 0.01 * truth.variance);
@@ -63,6 +63,91 @@ TEST(SobolIndices, IntervalsExcludeIndicesOfAnotherFunction) {
   const IshigamiTruth truth = TruthOfIshigami();
   EXPECT_LT(result.indices[0].first_interval.upper, truth.first[0]);
   EXPECT_GT(result.indices[2].first_interval.lower, truth.first[2]);
+}
+
+// Π (|4 x_i − 2| + a_i)/(1 + a_i) on (0, 1)⁴ [Sobol' 2003]; variances of the factors are
+// v_i = 1/(3 (1 + a_i)²).
+constexpr double kG[] = {0.0, 1.0, 4.5, 9.0};
+double GFunction(const std::vector<double>& x) {
+  double product = 1.0;
+  for (size_t i = 0; i < x.size(); ++i) {
+    product *= (std::abs(4.0 * x[i] - 2.0) + kG[i]) / (1.0 + kG[i]);
+  }
+  return product;
+}
+
+// Share of all intervals of a function's indices, over many seeds, that contain the true ones when
+// they are stretched about their middles.
+class Coverage {
+ public:
+  Coverage(const Function& f, Uniform range, std::vector<double> first, std::vector<double> total,
+           std::uint64_t blocks)
+      : first_(std::move(first)), total_(std::move(total)) {
+    for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+      results_.push_back(
+          SobolIndices(Evaluate(f, first_.size(), range, blocks, seed), first_.size()));
+    }
+  }
+
+  [[nodiscard]] double At(double stretch) const {
+    int hits = 0, all = 0;
+    const auto count = [&](const Interval& interval, double truth) {
+      const double middle = 0.5 * (interval.lower + interval.upper);
+      hits += std::abs(truth - middle) <= stretch * 0.5 * (interval.upper - interval.lower) ? 1 : 0;
+      ++all;
+    };
+    for (const SobolResult& result : results_) {
+      for (size_t i = 0; i < first_.size(); ++i) {
+        count(result.indices[i].first_interval, first_[i]);
+        count(result.indices[i].total_interval, total_[i]);
+      }
+    }
+    return static_cast<double>(hits) / all;
+  }
+
+ private:
+  std::vector<double> first_, total_;
+  std::vector<SobolResult> results_;
+};
+
+// 95 % and three standard errors of a share of 200 independent seeds, halved, since the indices of
+// one seed vary mostly by themselves.
+constexpr double kStrays = 0.5 * 3.0 * 0.0154;
+
+void ExpectNinetyFivePercent(const Coverage& coverage) {
+  EXPECT_NEAR(coverage.At(1.0), 0.95, kStrays);
+  // What is half as wide again, or narrower by that, does not pass.
+  EXPECT_GT(coverage.At(1.5), 0.95 + kStrays);
+  EXPECT_LT(coverage.At(1.0 / 1.5), 0.95 - kStrays);
+}
+
+TEST(SobolIndices, IntervalsOfIshigamisFunctionContainTheTruthNinetyFiveTimesInAHundred) {
+  const IshigamiTruth truth = TruthOfIshigami();
+  for (const std::uint64_t blocks : {64u, 512u}) {
+    SCOPED_TRACE(blocks);
+    ExpectNinetyFivePercent({Ishigami,
+                             {-kPi, kPi},
+                             {truth.first, truth.first + 3},
+                             {truth.total, truth.total + 3},
+                             blocks});
+  }
+}
+
+TEST(SobolIndices, IntervalsOfAGFunctionContainTheTruthNinetyFiveTimesInAHundred) {
+  double product = 1.0;
+  std::vector<double> first, total;
+  for (const double a : kG) {
+    first.push_back(1.0 / (3.0 * (1.0 + a) * (1.0 + a)));
+    product *= 1.0 + first.back();
+  }
+  for (double& v : first) {
+    total.push_back(v * product / (1.0 + v) / (product - 1.0));
+    v /= product - 1.0;
+  }
+  for (const std::uint64_t blocks : {64u, 512u}) {
+    SCOPED_TRACE(blocks);
+    ExpectNinetyFivePercent({GFunction, {0.0, 1.0}, first, total, blocks});
+  }
 }
 
 TEST(SobolIndices, OfASumAreTheSharesOfItsParts) {

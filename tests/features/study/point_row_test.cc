@@ -1,9 +1,12 @@
 // Rows of points.csv: to the last bit, and nothing that is none is taken for one.
 #include "features/study/summary.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
+#include <random>
 
 namespace mbv {
 namespace {
@@ -45,6 +48,17 @@ TEST(PointRow, RefusesWhatIsNotARowOfTheStudy) {
        {"", "1", "1,9,0,,0.5,1", "1,9,0,,0.5,1,2,3", "1,8,0,,0.5,1,2", "1,9,0,,0.5,x,2",
         "-1,9,0,,0.5,1,2", "1,9,0,\"open,0.5,1,2", "1,9,0,,0.5,1,2x"}) {
     EXPECT_FALSE(ReadPointLine(bad, study)) << bad;
+  }
+}
+
+TEST(PointRow, NumbersHaveSeventeenDigitsAsPrinted) {
+  Study study;
+  study.factors = {{.name = "x", .key = "x", .axis = {}}};
+  std::mt19937_64 random(20261129);
+  for (int k = 0; k < 20000; ++k) {
+    const double value = k < 100 ? 0.5 * k - 3.0 : std::bit_cast<double>(random());
+    const std::string digits = std::isfinite(value) ? fmt::format("{:.17g}", value) : "";
+    EXPECT_EQ(PointLine({.reason = {}, .varied = {value}}, study), "0,1,0,," + digits + "\n");
   }
 }
 

@@ -189,5 +189,136 @@ TEST_F(ScenarioMemoryTest, PointsOfShippedStudiesAreThoseOfTheirCommands) {
   EXPECT_GE(studies, 13);
 }
 
+// What a command is at some times.
+std::string BitsOfCommands(const Motion& motion) {
+  std::string text;
+  for (const Command& command : motion.commands) {
+    for (const double share : {0.0, 0.31, 1.0}) {
+      const Jet jet = Evaluate(command.profile, share * motion.duration_s);
+      text += Bits(std::vector{jet.value, jet.rate, jet.acceleration});
+    }
+  }
+  return text;
+}
+
+TEST_F(ScenarioMemoryTest, NumbersOfCommandsAreThoseThatLoadingGives) {
+  const ParsedDocuments documents;
+  std::mt19937_64 random(20261129);
+  int found = 0;
+  for (const std::string& file : ShippedFiles(false)) {
+    YamlReader reader(file);
+    const auto text = reader.ReadFile();
+    const YamlNodePtr root = text ? reader.Parse(*text) : nullptr;
+    const ScenarioResult nominal = LoadScenario(file);
+    if (root == nullptr || !nominal.scenario || nominal.scenario->motion.free()) continue;
+    std::vector<std::string> keys;
+    AddKeys(*root, "", &keys);
+    ScenarioMemory memory;
+    for (const std::string& key : keys) {
+      if (!key.starts_with("motion.commands.")) continue;
+      const double value = std::uniform_real_distribution(0.97, 1.03)(random) *
+                           *PlainNumber(FindSetNode(*root, key)->text);
+      const std::vector<SetValue> set = {{key, fmt::format("{:.17g}", value)}};
+      const ScenarioResult loaded = LoadScenario(file, {.set = set}, &memory);
+      if (!loaded.scenario) continue;
+      Motion motion = nominal.scenario->motion;
+      const auto number = memory.FindCommandNumber(key, loaded.scenario->motion);
+      if (!number) continue;
+      ASSERT_TRUE(number->Put(value, &motion)) << file << ' ' << key;
+      EXPECT_EQ(BitsOfCommands(motion), BitsOfCommands(loaded.scenario->motion))
+          << file << ' ' << key;
+      // Where the number moves the command, another one is seen.
+      ASSERT_TRUE(number->Put(1.001 * value + 1e-3, &motion));
+      EXPECT_NE(BitsOfCommands(motion), BitsOfCommands(loaded.scenario->motion))
+          << file << ' ' << key;
+      ++found;
+    }
+  }
+  EXPECT_GT(found, 200);
+}
+
+TEST_F(ScenarioMemoryTest, NumbersThatTheReaderRefusesAreNotPut) {
+  Motion motion;
+  motion.commands.push_back({.name = "a", .profile = {{SineTerm{1.0, 2.0, 0.5}}}});
+  CommandNumber number{.field = CommandNumber::Field::kPeriod, .to_si = kPlain.to_si};
+  for (const double refused : {0.0, -1.0, kNan, HUGE_VAL}) {
+    EXPECT_FALSE(number.Put(refused, &motion)) << refused;
+  }
+  EXPECT_EQ(std::get<SineTerm>(motion.commands[0].profile.terms[0]).frequency_hz, 2.0);
+  EXPECT_TRUE(number.Put(4.0, &motion));
+  EXPECT_EQ(std::get<SineTerm>(motion.commands[0].profile.terms[0]).frequency_hz, 0.25);
+}
+
+// A study of poses, which keeps what it prepared; far beyond the reach of the limbs some of them.
+Study PlatformPoses(const std::vector<std::string>& witnesses) {
+  Study study;
+  study.name = "poses";
+  study.scenario = "scenarios/stabilizing_platform/random.yaml";
+  const auto vary = [&](const std::string& key, double lower, double upper) {
+    study.factors.push_back(
+        {.name = key, .key = "motion.commands." + key, .axis = {lower, Uniform{lower, upper}}});
+  };
+  vary("roll.sine.phase_deg", 0.0, 360.0);
+  vary("pitch.sine.amplitude_deg", 1.0, 30.0);
+  vary("heave.sine.period_s", 2.0, 9.0);
+  study.design = {.kind = DesignKind::kSobol, .count = 64};
+  study.witnesses = witnesses;
+  study.quantities = {{.name = "limb1.drive.force.max", .channel = "limb1.drive.force"},
+                      {.name = "limb2.drive_p.force.end",
+                       .channel = "limb2.drive_p.force",
+                       .statistic = Statistic::kEnd}};
+  if (witnesses.size() > 1)
+    study.quantities.push_back({.name = "force_nrmse", .channel = {}, .of_pair = true});
+  study.limits = {{.quantity = 0, .below = 1e6, .above = {}}};
+  return study;
+}
+
+TEST_F(ScenarioMemoryTest, KeptPointsAreThoseOfTheirCommands) {
+  const ParsedDocuments documents;
+  for (const std::vector<std::string>& witnesses :
+       {std::vector<std::string>{"analytic"}, {"reference"}, {"analytic", "reference"}}) {
+    const Study study = PlatformPoses(witnesses);
+    Diagnostics diagnostics;
+    int exit_code = 0;
+    const auto bench = StudyBench::Make(study, &diagnostics, &exit_code);
+    ASSERT_TRUE(bench) << diagnostics.Text();
+    ASSERT_TRUE(bench->keeps());
+    int failed = 0;
+    for (std::uint64_t k = 0; k < 64; ++k) {
+      const PointRow row = bench->Run((k * 37) % 64).row;
+      std::vector<SetValue> set;
+      for (size_t f = 0; f < row.varied.size(); ++f) {
+        set.emplace_back(study.factors[f].key, fmt::format("{:.17g}", row.varied[f]));
+      }
+      Diagnostics found;
+      const auto prepared = Prepare(study.scenario, {.set = set}, &found);
+      ASSERT_TRUE(prepared);
+      const StudyRun run = RunStudyWitnesses(*prepared, study.witnesses);
+      if (!run.failure.empty()) {
+        EXPECT_EQ(row.reason, run.failure) << k;
+        ++failed;
+        continue;
+      }
+      EXPECT_EQ(row.reason, UnresolvedBySamples(run)) << k;
+      if (!row.reason.empty()) continue;
+      EXPECT_EQ(Bits(row.values), Bits(MeasureQuantities(run, study.quantities).values)) << k;
+    }
+    EXPECT_GT(failed, 3);
+    EXPECT_LT(failed, 60);
+  }
+}
+
+TEST_F(ScenarioMemoryTest, PointsOfOtherMachinesAreNotKept) {
+  const ParsedDocuments documents;
+  Study study = PlatformPoses({"analytic"});
+  study.factors[0].key = "parameters.m_p";
+  study.factors[0].axis = {50000.0, Uniform{49000.0, 51000.0}};
+  Diagnostics diagnostics;
+  int exit_code = 0;
+  const auto bench = StudyBench::Make(study, &diagnostics, &exit_code);
+  ASSERT_TRUE(bench) << diagnostics.Text();
+  EXPECT_FALSE(bench->keeps());
+}
+
 }  // namespace
 }  // namespace mbv
