@@ -163,10 +163,10 @@ std::vector<double> InputsOf(const Mechanism& mechanism, const BodyStates& state
 
 double ValueAtStates(const Mechanism& mechanism, const BodyStates& states,
                      const StateFunction& function, double t_s) {
-  const int branch = function.number < 0
-                         ? kAnyBranch
-                         : states.Branch(mechanism.elements.size() +
-                                         static_cast<size_t>(function.number));
+  const int branch =
+      function.number < 0
+          ? kAnyBranch
+          : states.Branch(mechanism.elements.size() + static_cast<size_t>(function.number));
   return function.At(t_s, InputsOf(mechanism, states, function), branch);
 }
 
@@ -176,8 +176,7 @@ LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,
   if (sample.load == nullptr) return at;
   for (const Load::Following& part : sample.load->following) {
     Vec3& vector = part.component < 3 ? at.force : at.moment;
-    vector[part.component % 3] +=
-        ValueAtStates(mechanism, states, part.function, sample.time_s);
+    vector[part.component % 3] += ValueAtStates(mechanism, states, part.function, sample.time_s);
   }
   return at;
 }

@@ -121,9 +121,9 @@ ChannelColumns::ChannelColumns(const std::vector<Channel>& channels) {
 
 const char* ToText(Happening what) {
   constexpr std::array<const char*, 11> kWords = {
-      "rests",          "slides up",    "slides down", "switched off", "hits upper end",
-      "hits lower end", "other branch", "free",        "at upper end", "at lower end",
-      "passes knot"};
+      "rests",          "slides up",      "slides down",  "switched off",
+      "hits upper end", "hits lower end", "other branch", "free",
+      "at upper end",   "at lower end",   "passes knot"};
   return kWords.at(static_cast<size_t>(what));
 }
 

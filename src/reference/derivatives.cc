@@ -111,7 +111,7 @@ ForceAndSlope Vary(const CurvesLaw& law, const Varying& at) {
           c.slope + (b.slope - c.slope) * t + (b.force - c.force) * dt};
 }
 ForceAndSlope Vary(const ExpressionLaw& law, const Varying& at) {
-  const double reach = 0.1 * at.unit;  // as in VaryFollowing()
+  const double reach = 0.1 * at.unit;                     // as in VaryFollowing()
   const int branch = law.BranchAt(at.position, at.rate);  // one-sided at corners
   const auto force = [&](double x, double v) { return law.At(x, v, branch); };
   const double by_x = SlopeAt([&](double x) { return force(x, at.rate); }, at.position, reach);

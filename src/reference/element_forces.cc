@@ -238,8 +238,8 @@ void ForElements(const Mechanism& mechanism, const BodyStates& states,
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
     const ScalarRow row = ElementRow(mechanism, e, states);
-    AlongElement at = MotionOf(
-        element, row, states, friction_signs.empty() ? 0 : friction_signs[e], states.Engaged(e));
+    AlongElement at = MotionOf(element, row, states, friction_signs.empty() ? 0 : friction_signs[e],
+                               states.Engaged(e));
     at.branch = states.Branch(e);
     std::visit([&](const auto& law) { visit(law, row, at); }, element.law);
   }

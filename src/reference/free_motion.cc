@@ -25,8 +25,8 @@ namespace odeint = boost::numeric::odeint;
 
 constexpr double kSmallestStepShare = 1e-10;  // of the duration
 constexpr int kMostBranched = 4;  // at one time: a branch that is left for one that leads back
-constexpr double kCornerShare = 1e-10;        // of a step: how well a corner is found
-constexpr double kJump = 1e-6;                // a smaller share of a load is not a jump
+constexpr double kCornerShare = 1e-10;  // of a step: how well a corner is found
+constexpr double kJump = 1e-6;          // a smaller share of a load is not a jump
 // Below this share of the largest pivot steps go half the way to the singular pose at most.
 constexpr double kApproach = 0.2;
 constexpr size_t kMostNodes = 600;

@@ -226,7 +226,7 @@ class FreeMotion {
   std::vector<End> ends_, in_touch_;  ///< of rigid stops; in touch: by increasing elements
   int impacts_here_ = 0;              ///< since the last sample
   EventLog log_;
-  int settled_here_ = 0;  ///< how often friction was decided at this very time
+  int settled_here_ = 0;   ///< how often friction was decided at this very time
   int branched_here_ = 0;  ///< how often branches were left at this very time
 };
 

@@ -355,9 +355,10 @@ class FunctionReader {
       return all;
     };
     StateFunction function{.inputs = inputs_,
-                           .value = [formula, known](double t_s, std::span<const double> inputs) {
-                             return formula->At(known(t_s, inputs));
-                           },
+                           .value =
+                               [formula, known](double t_s, std::span<const double> inputs) {
+                                 return formula->At(known(t_s, inputs));
+                               },
                            .signals = used_};
     if (!formula->has_branches()) return function;
     function.branch = [formula, known](double t_s, std::span<const double> inputs) {
@@ -431,14 +432,15 @@ StateFunctions::StateFunctions(ValueReader* values, const Mechanism& mechanism,
       yaml.Error(entry, fmt::format("{}: {}", path, why_not));
     } else if (!entry.value->is_scalar()) {
       const ProfileContext context{
-          .unit = "", .home = {}, .name = path, .may_jump = true, .tables = tables};
+          .unit = "1", .home = {}, .name = path, .may_jump = true, .tables = tables};
       signals_[entry.key] = ReadProfile(values, *entry.value, path, context);
     } else if (const auto text = yaml.Text(*entry.value, path)) {
       variables_[entry.key] = *text;
     }
   }
   for (const YamlEntry& entry : yaml.Entries(*variables, "variables")) {
-    if (entry.value->is_scalar() && !yaml.has_errors()) (void)Read(*entry.value, "variables." + entry.key);
+    if (entry.value->is_scalar() && !yaml.has_errors())
+      (void)Read(*entry.value, "variables." + entry.key);
   }
 }
 
@@ -447,8 +449,7 @@ bool StateFunctions::Follows(const YamlNode& node) const {
   const std::vector<Piece> pieces = PiecesOf(node.text);
   return std::ranges::any_of(pieces, [&](const Piece& piece) {
     return piece.is_dotted() || (piece.text == kTime && !values_.HasParameter(kTime)) ||
-           (piece.is_word &&
-            (variables_.contains(piece.text) || signals_.contains(piece.text)));
+           (piece.is_word && (variables_.contains(piece.text) || signals_.contains(piece.text)));
   });
 }
 

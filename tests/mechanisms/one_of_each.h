@@ -138,17 +138,24 @@ struct Differentiated {
     }
     reduced = std::make_unique<ReducedModel>(mechanism, coordinates);
   }
-  // A little away from home, where poses are regular: as far as the loops let it.
-  void Choose(unsigned seed) {
+  // A little away from home, where poses are regular: as far as the loops let it. Every model has
+  // states of its own, whatever other models there are. Rates are so large that differences of a
+  // tenth of them have their digits.
+  void Choose() {
     const auto n = static_cast<Eigen::Index>(coordinates.size());
     const double length = CharacteristicLength(mechanism);
+    std::seed_seq seed(mechanism.name.begin(), mechanism.name.end());
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> any(-1.0, 1.0);
+    const auto rate = [&] {
+      const double x = any(random);
+      return std::copysign(0.3, x) + 0.7 * x;
+    };
     unit.resize(n), v.resize(n), a.resize(n);
     VecX step(n);
     for (Eigen::Index k = 0; k < n; ++k) {
       unit[k] = IsLength(mechanism, coordinates[static_cast<size_t>(k)]) ? length : 1.0;
-      v[k] = unit[k] * any(random), a[k] = unit[k] * any(random), step[k] = unit[k] * any(random);
+      v[k] = unit[k] * rate(), a[k] = unit[k] * any(random), step[k] = unit[k] * any(random);
     }
     for (share = 0.02; share > 1e-6; share *= 0.1) {
       q = reduced->home() + share * step;

@@ -199,7 +199,6 @@ TEST(ExpressionBranches, AreTheExpressionWhereTheyHold) {
   scope.Define("a", "0.3");
   const std::vector<std::string> texts = {
       "abs(x)",
-      "abs (x - a) + v",
       "sign(x)*v",
       "min(x, v)",
       "max(0, x - a, v)",

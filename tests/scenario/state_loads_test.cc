@@ -94,7 +94,7 @@ TEST(StateFunctions, MayNameTheirParts) {
 
 TEST(StateFunctions, KnowSignalsOfTheTimeAndTheirJumps) {
   const test::TestFolder folder("signals");
-  folder.Write("wind.csv", "t,v\n0,1\n0.25,2\n0.5,4\n0.75,3\n1,1\n");
+  folder.Write("wind.csv", "t,v\n0,1\n0.25,2\n0.4,3\n0.5,4\n0.75,3\n1,1\n");
   const auto with = [&](const std::string& variables, const std::string& moment) {
     const std::string text = std::string("mechanism: ") + kSourceDir +
                              "/models/four_bar/model.yaml\n"
@@ -104,10 +104,10 @@ TEST(StateFunctions, KnowSignalsOfTheTimeAndTheirJumps) {
                              "\"]}}\nanalytic: none\n";
     return LoadScenario(folder.Write("s.yaml", text));
   };
-  const ScenarioResult result =
-      with("{wind: {table: {csv: wind.csv, column: v}}, gust: [0.5, {step: {height: 2, at_s: 0.4}}],"
-           " both: wind + gust}",
-           "-both*motor.velocity - (wind > 3.5)");
+  const ScenarioResult result = with(
+      "{wind: {table: {csv: wind.csv, column: v}}, gust: [0.5, {step: {height: 2, at_s: 0.4}}],"
+      " both: wind + gust}",
+      "-both*motor.velocity - (wind > 3.5)");
   ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
   const Motion& motion = result.scenario->motion;
   const StateFunction& f = motion.loads.at(0).following.at(0).function;
@@ -120,8 +120,41 @@ TEST(StateFunctions, KnowSignalsOfTheTimeAndTheirJumps) {
   EXPECT_NE(f.branch(0.5, std::vector<double>{2.0}), f.branch(0.25, std::vector<double>{2.0}));
   EXPECT_EQ(BranchingFunctions(*result.mechanism, motion).at(0).path, "loads.l.moment[2]");
   EXPECT_NE(with("{a: {sinus: 1}}", "a").diagnostics.Text().find("variables.a"), std::string::npos);
-  EXPECT_NE(with("{a: {table: {csv: none.csv, column: v}}}", "a").diagnostics.Text().find("none.csv"),
-            std::string::npos);
+  EXPECT_NE(
+      with("{a: {table: {csv: none.csv, column: v}}}", "a").diagnostics.Text().find("none.csv"),
+      std::string::npos);
+}
+
+// A rigid stop acts where forces move what hits it, alone.
+TEST(RigidStops, AreWarnedOfWhereTheyDoNothingAndRefusedBesideFriction) {
+  const auto text_of = [](const std::string& friction, const std::string& motion) {
+    const test::TestFolder folder("rigid_stop");
+    folder.Write("m.yaml", R"(name: block
+bodies: {block: {mass: 1, com: [0, 0, 0], inertia: [1, 1, 1]}}
+joints: {slide: {kind: prismatic, parent: world, child: block, axis: x}}
+drives: {motor: {kind: joint, joint: slide}}
+elements:
+  wall: {kind: stop, joint: slide, upper: 0.1, restitution: 0.5}
+)" + friction);
+    const ScenarioResult result = LoadScenario(folder.Write(
+        "s.yaml", "mechanism: ./m.yaml\nmotion: {duration_s: 1, " + motion + "analytic: none\n"));
+    EXPECT_EQ(result.scenario.has_value(),
+              friction.empty() || motion.find("initial") == std::string::npos);
+    return result.diagnostics.Text();
+  };
+  const std::string dry = "  guide: {kind: friction, joint: slide, coulomb: 2}\n";
+  const std::string commanded = "commands: {motor: 0}}\n";
+  const std::string free = "initial: {motor: 0}}\nforces: {motor: 1}\n";
+  const auto contains = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
+  EXPECT_EQ(text_of("", free), "");
+  EXPECT_TRUE(contains(text_of("", commanded), "warning: the rigid stop"))
+      << text_of("", commanded);
+  EXPECT_TRUE(contains(text_of("", commanded), "does nothing in commanded motions"));
+  EXPECT_TRUE(contains(text_of(dry, free), "error: motion: the rigid stop")) << text_of(dry, free);
+  EXPECT_TRUE(contains(text_of(dry, free), "are not computed together"));
+  EXPECT_FALSE(contains(text_of(dry, commanded), "are not computed together"));
 }
 
 TEST(StateLoads, UnknownNamesAreFindings) {

@@ -181,7 +181,7 @@ TEST(FreeMotionVerdicts, SamplesThatAMotionTurnsTooFarBetweenJudgeNoRates) {
 TEST(FreeMotionVerdicts, ALoadThatJumpsIsFollowedAcross) {
   for (const char* moment :
        {"2*(motor.position > -1) - 0.03*motor.velocity", "0.5*(t > 1.23456) + 0*motor.velocity",
-        "-0.3*abs(motor.position + 0.2)", "max(-1, -3*motor.position)",
+        "-0.3*abs(motor.position + 0.2) - 0.1*motor.velocity", "max(-1, -3*motor.position)",
         "motor.position < -1 ? -2 - 0.1*motor.velocity : 0.3*min(t, 1)"}) {
     const Comparison jumps = RunBar(moment);
     EXPECT_EQ(jumps.verdict, Verdict::kAgree) << moment << ": " << TextOf(jumps);

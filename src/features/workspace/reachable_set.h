@@ -105,8 +105,8 @@ struct SetWays {
 /// The verdict of what both ways found.
 void JudgeSet(ReachableSet* set);
 
-/// Constraint singularities inside a set of two dimensions (constraint_curves.cc): arcs of two nodes
-/// each [m or rad], within a cell of the lattice. Empty of other dimensions.
+/// Constraint singularities inside a set of two dimensions (constraint_curves.cc): arcs of two
+/// nodes each [m or rad], within a cell of the lattice. Empty of other dimensions.
 [[nodiscard]] std::vector<TracedArc> ConstraintCurves(const SetQuestion& question,
                                                       const ReachableSet& set);
 

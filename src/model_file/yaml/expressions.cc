@@ -379,7 +379,8 @@ class MuFormula : public Formula {
   static constexpr double kMostBranches = 1 << 30;
 
   struct Chooser {
-    static constexpr int kRounded = 1024;  // whole numbers are told apart up to multiples of this
+    static constexpr int kRounded =
+        1024;  // whole numbers are distinguished up to multiples of this
     Decision::Kind kind;
     std::vector<std::unique_ptr<mu::Parser>> values;
 

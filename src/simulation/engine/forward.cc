@@ -123,8 +123,8 @@ class StickSlip {
   std::vector<size_t> corners_;  ///< elements whose law has corners
   size_t branch_elements_ = 0;   ///< expressions among them
   const std::vector<BranchingFunction> branching_;
-  std::vector<int> pieces_;      ///< of corners_, then of branching_, at the present node
-  std::vector<double> rates_;    ///< of these, by (1)
+  std::vector<int> pieces_;    ///< of corners_, then of branching_, at the present node
+  std::vector<double> rates_;  ///< of these, by (1)
   std::vector<std::pair<size_t, int>> ends_;  ///< of rigid stops
   std::vector<double> closed_;                ///< per end: its gap at the node where that is closed
   std::vector<int> touch_;                    ///< per element: the end in touch, or 0
@@ -704,12 +704,11 @@ RunSummary StickSlip::Advance(const Step& step) {
     uniform_ = 0;
   }
   return {.stop = Stop::kNoConvergence,
-          .message = fmt::format(
-              "{} again and again at t = {:.6g} s",
-              has_branches()  ? "expressions change between branches"
-              : ends_.empty() ? "friction starts and stops"
-                              : "rigid stops are hit",
-              from),
+          .message = fmt::format("{} again and again at t = {:.6g} s",
+                                 has_branches()  ? "expressions change between branches"
+                                 : ends_.empty() ? "friction starts and stops"
+                                                 : "rigid stops are hit",
+                                 from),
           .time_s = from,
           .states_time = true};
 }

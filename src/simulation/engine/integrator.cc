@@ -34,6 +34,14 @@ Integrator::Integrator(Session* session, double h)
   // Rotation rows: of that mass at a characteristic length.
   largest_R_ = s_.system.row_unit() / s_.system.length();
   largest_R_ = (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_)) * largest_R_.cwiseAbs2();
+  // MuJoCo 2.2 softens a weld's rotation rows as its translation rows, in 1/kg: the smaller the
+  // bodies, the harder they would be held beside what their inertia is.
+  R_unit_.setOnes(rows);
+  for (size_t c = 0; c < s_.engine.plan.closures.size(); ++c) {
+    if (s_.engine.plan.closures[c].type == mjcf::PlannedClosure::Type::kConnect) continue;
+    R_unit_.segment<3>(s_.system.closure_row(static_cast<int>(c)) + 3)
+        .setConstant(1.0 / (s_.system.length() * s_.system.length()));
+  }
   largest_friction_R_.resize(s_.system.friction_rows());
   friction_R_ = friction_aref_ = largest_friction_R_;
   for (int row = 0; row < s_.system.friction_rows(); ++row) {
@@ -387,7 +395,7 @@ void Integrator::SetReference(const VecX& v, const DrivenSample& at, Guidance gu
   if (guidance == Guidance::kNew) guidance_ = b_ * rate_ + k_ * s_.system.residual();
   aref_ -= guidance_;
   Eigen::Map<VecX> R(d_->efc_R, rows);
-  R = kSoftness * R.cwiseMin(largest_R_);
+  R = kSoftness * R.cwiseProduct(R_unit_).cwiseMin(largest_R_);
   Eigen::Map<VecX>(d_->efc_D, rows) = R.cwiseInverse();
   SetFrictionRows(v);
   ApplyReference();

@@ -98,6 +98,7 @@ class Integrator {
   mjData* const d_;
   double b_ = 0.0, k_ = 0.0;  // of (1)
   VecX largest_R_;            // per row [1/kg], [1/(kg m²)]
+  VecX R_unit_;               // per row: what MuJoCo's own R is multiplied by
   VecX largest_friction_R_;   // the same, per row of friction
   VecX friction_R_, friction_aref_;
   VecX q_, v_;  // corrected state at the present node

@@ -25,13 +25,13 @@ struct BothWays {
 };
 
 // At a state of the mechanism; `planted` changes what the second one knows.
-BothWays Differentiate(const Mechanism& mechanism, unsigned seed, VecX* unit) {
+BothWays Differentiate(const Mechanism& mechanism, VecX* unit) {
   BothWays both;
   Differentiated subject(mechanism);
   if (subject.coordinates.empty()) return both;
   Load following;
   AddAllLoads(&subject, &following);
-  subject.Choose(seed);
+  subject.Choose();
   both.force = subject.Forces(subject.q, subject.v, subject.a);
   MatX T;
   EXPECT_TRUE(subject.reduced->Motions(&T).ok()) << mechanism.name;
@@ -53,10 +53,9 @@ BothWays Differentiate(const Mechanism& mechanism, unsigned seed, VecX* unit) {
 }
 
 TEST(ExactDerivatives, AgreeWithThoseOfTheReference) {
-  unsigned seed = 1;
   for (const Mechanism& mechanism : MechanismsWithDerivatives()) {
     VecX unit;
-    const BothWays both = Differentiate(mechanism, seed++, &unit);
+    const BothWays both = Differentiate(mechanism, &unit);
     if (unit.size() == 0) continue;
     const double q = Apart(both.implicit.by_position, both.dual.by_position, unit);
     const double v = Apart(both.implicit.by_velocity, both.dual.by_velocity, unit);
@@ -75,9 +74,9 @@ TEST(ExactDerivatives, DifferWhereMassesDo) {
   for (Mechanism mechanism : MechanismsWithDerivatives()) {
     if (mechanism.name != "stewart" && mechanism.name != "scara_robot") continue;
     VecX unit;
-    const BothWays truth = Differentiate(mechanism, 3, &unit);
+    const BothWays truth = Differentiate(mechanism, &unit);
     for (Body& body : mechanism.bodies) body.mass *= 1.0 + 1e-8;
-    const BothWays off = Differentiate(mechanism, 3, &unit);
+    const BothWays off = Differentiate(mechanism, &unit);
     EXPECT_GT(Apart(off.dual.by_position, truth.implicit.by_position, unit), 1e-11);
     EXPECT_GT(Apart(off.implicit.by_position, truth.dual.by_position, unit), 1e-11);
   }
@@ -135,14 +134,13 @@ ForcesApart CompareForces(const Mechanism& described, const Mechanism& known,
 }
 
 TEST(ExactDerivatives, OfEveryForceAgreeWithThoseOfTheReference) {
-  unsigned seed = 1;
   size_t unique = 0, of_drives = 0, all = 0;
   for (const Mechanism& mechanism : MechanismsWithDerivatives()) {
     Differentiated subject(mechanism);
     if (subject.coordinates.empty()) continue;
     Load following;
     AddAllLoads(&subject, &following);
-    subject.Choose(seed++);
+    subject.Choose();
     const ForcesApart apart = CompareForces(mechanism, mechanism, &subject);
     EXPECT_LT(apart.off, 1e-10) << mechanism.name;
     unique += apart.unique, of_drives += apart.of_drives ? 1U : 0U, ++all;
@@ -156,7 +154,7 @@ TEST(ExactDerivatives, OfEveryForceDifferWhereMassesDo) {
   for (const Mechanism& mechanism : MechanismsWithDerivatives()) {
     if (mechanism.name != "stewart" && mechanism.name != "scara_robot") continue;
     Differentiated subject(mechanism);
-    subject.Choose(3);
+    subject.Choose();
     Mechanism off = mechanism;
     for (Body& body : off.bodies) body.mass *= 1.0 + 1e-8;
     EXPECT_LT(CompareForces(mechanism, mechanism, &subject).off, 1e-11);
@@ -170,7 +168,7 @@ TEST(ExactDerivatives, OfFrictionByLoad) {
   const Mechanism mechanism = ModelAt("/models/journal_crank/model.yaml");
   Differentiated subject(mechanism);
   ASSERT_EQ(subject.coordinates.size(), 1U);
-  subject.Choose(5);
+  subject.Choose();
   for (const double rate : {1.0, -7.0}) {
     subject.v[0] = rate;
     const ForcesApart apart = CompareForces(mechanism, mechanism, &subject);
