@@ -249,6 +249,38 @@ TEST_F(ScenarioMemoryTest, NumbersThatTheReaderRefusesAreNotPut) {
   EXPECT_EQ(std::get<SineTerm>(motion.commands[0].profile.terms[0]).frequency_hz, 0.25);
 }
 
+// A closed form that serves any profiles gives, after another motion of its commands, what a new
+// one gives.
+TEST_F(ScenarioMemoryTest, FormsThatServeAnyProfilesForgetTheMotionBefore) {
+  const ParsedDocuments documents;
+  int served = 0;
+  for (const std::string& file : ShippedFiles(false)) {
+    const ClosedFormRow* row = FindClosedForm(ReadScenarioHead(file).mechanism);
+    if (row == nullptr || !row->serves_any_profiles) continue;
+    Diagnostics diagnostics;
+    const auto used = Prepare(file, {}, &diagnostics), fresh = Prepare(file, {}, &diagnostics);
+    if (!used || !used->has_closed_form() || !used->scenario.analytic.equations.empty()) continue;
+    const Motion& motion = used->scenario.motion;
+    Motion other = motion;
+    for (Command& command : other.commands) {
+      for (ProfileTerm& term : command.profile.terms) {
+        if (auto* sine = std::get_if<SineTerm>(&term)) sine->phase_rad += 0.7;
+        if (auto* constant = std::get_if<ConstantTerm>(&term)) constant->value *= 1.01;
+      }
+    }
+    const auto run = [&](const Prepared& prepared, const Motion& along) {
+      return RunClosedForm(prepared.mechanisms.analytic, along,
+                           prepared.closed_form.closed_form.get());
+    };
+    (void)run(*used, other);
+    const ClosedFormRun again = run(*used, motion), anew = run(*fresh, motion);
+    EXPECT_EQ(again.summary.message, anew.summary.message) << file;
+    EXPECT_EQ(Bits(again.trace.values.reshaped()), Bits(anew.trace.values.reshaped())) << file;
+    ++served;
+  }
+  EXPECT_GT(served, 20);
+}
+
 // A study of poses, which keeps what it prepared; far beyond the reach of the limbs some of them.
 Study PlatformPoses(const std::vector<std::string>& witnesses) {
   Study study;
