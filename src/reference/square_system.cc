@@ -26,19 +26,20 @@ SquareSystem::SquareSystem(size_t bodies, double length)
 
 SparseLu::Matrix SquareSystem::ScaledColumns(const RowSet& rows,
                                              const std::vector<int>& among) const {
-  std::vector<Eigen::Triplet<double>> entries;
+  SparseLu::Matrix columns(size_, static_cast<Eigen::Index>(among.size()));
+  columns.reserve(6 * static_cast<Eigen::Index>(rows.body.size()));
   for (int k = 0; k < static_cast<int>(among.size()); ++k) {
     const int i = among[k];
+    columns.startVec(k);
     for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
       const int at = 6 * (rows.body[p] - 1);
       for (int c = 0; c < 6; ++c) {
         const double x = RowScale(rows.angular[i]) * body_scale_[at + c] * rows.J[p][c];
-        if (x != 0.0) entries.emplace_back(at + c, k, x);
+        if (x != 0.0) columns.insertBack(at + c, k) = x;
       }
     }
   }
-  SparseLu::Matrix columns(size_, static_cast<Eigen::Index>(among.size()));
-  columns.setFromTriplets(entries.begin(), entries.end());
+  columns.finalize();
   return columns;
 }
 
@@ -96,17 +97,17 @@ std::vector<int> SquareSystem::IndependentRows(const RowSet& rows,
 }
 void SquareSystem::MakeColumns(const RowSet& rows, const std::vector<int>& selection,
                                SparseLu::Matrix* columns) const {
-  std::vector<Eigen::Triplet<double>> entries;
+  columns->resize(size_, static_cast<Eigen::Index>(selection.size()));
+  columns->reserve(6 * static_cast<Eigen::Index>(rows.body.size()));
   for (int k = 0; k < static_cast<int>(selection.size()); ++k) {
     const int i = selection[k];
+    columns->startVec(k);
     for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
       const int at = 6 * (rows.body[p] - 1);
-      for (int c = 0; c < (rows.angular[i] ? 3 : 6); ++c) entries.emplace_back(at + c, k, 1.0);
+      for (int c = 0; c < (rows.angular[i] ? 3 : 6); ++c) columns->insertBack(at + c, k) = 1.0;
     }
   }
-  columns->resize(size_, static_cast<Eigen::Index>(selection.size()));
-  columns->setFromTriplets(entries.begin(), entries.end());
-  columns->makeCompressed();
+  columns->finalize();
   FillColumns(rows, selection, columns);
 }
 
