@@ -1001,6 +1001,20 @@ TEST(ForeignMjcf, WordsOfNewerVersionsAreTranslatedOrLeftOutWhereNoForceDependsO
   EXPECT_FALSE(ReadText(Arm({.joint = "type='of_tomorrow'"})).model);
 }
 
+// Terrain touches only: its file may be absent.
+TEST(ForeignMjcf, TerrainNeedsNoFile) {
+  for (const char* field :
+       {"file='hills.png'", "name='hills' file='x/absent.png'", "name='hills' nrow='3' ncol='4'",
+        "name='hills' nrow='2' ncol='3' elevation='0 1 0 1 0 1'"}) {
+    const Read read =
+        ReadText(Arm({.head = fmt::format("<asset><hfield size='5 4 0.2 0.1' {}/></asset>", field),
+                      .tail = "<worldbody><geom type='hfield' hfield='hills'/></worldbody>"}));
+    EXPECT_TRUE(read.model) << field << read.diagnostics.Text();
+  }
+  EXPECT_FALSE(
+      ReadText(Arm({.tail = "<worldbody><geom type='hfield' hfield='hills'/></worldbody>"})).model);
+}
+
 // Three slides and a ball carry a robot as a free joint does: held, or let go as one.
 TEST(ForeignMjcf, ABaseOnThreeSlidesAndABallFloats) {
   struct Base {

@@ -286,6 +286,7 @@ struct ForeignMjcf::Impl {
       if (in_assets && (IsTag(e, "texture") || IsTag(e, "material") || IsTag(e, "skin"))) {
         others.push_back(e);
       }
+      if (in_assets && IsTag(e, "hfield")) FlattenTerrain(e);
       if (e->Parent() != root()) return;
       for (const char* section : {"visual", "sensor"}) {
         if (IsTag(e, section)) others.push_back(e);
@@ -303,6 +304,18 @@ struct ForeignMjcf::Impl {
     });
     for (XMLElement* e : others) document.DeleteNode(e);
     DropUnusedMeshes();
+  }
+
+  // Heights touch only, and their file may be absent.
+  static void FlattenTerrain(XMLElement* e) {
+    const char* file = e->Attribute("file");
+    if (file != nullptr && e->Attribute("name") == nullptr) {
+      e->SetAttribute("name", fs::path(file).stem().string().c_str());
+    }
+    for (const char* attribute : {"file", "elevation", "content_type"}) {
+      e->DeleteAttribute(attribute);
+    }
+    for (const char* attribute : {"nrow", "ncol"}) e->SetAttribute(attribute, 2);
   }
 
   void DropUnusedMeshes() {
