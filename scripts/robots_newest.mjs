@@ -25,6 +25,7 @@ import {pathToFileURL} from 'node:url';
 import {leastSolution} from '../examples/witness/mujoco/algebra.mjs';
 import {load, messageOf, Refused} from '../examples/witness/mujoco/engine.mjs';
 import {equalityBias} from '../examples/witness/mujoco/inverse.mjs';
+import {EQUALITY_DATA} from '../examples/witness/mujoco/simulation.mjs';
 
 export const COMPILED = 1e-9, MOVING = 1e-6;  // limits, relative
 const STATES = 12;                            // samples of a motion
@@ -142,13 +143,15 @@ export class Robot {
     return {name: drive.name, dof: this.model.jnt_dofadr[id], at: this.model.jnt_qposadr[id]};
   }
 
-  /** Largest differences of masses, centres and inertias, relative, and where: [[value, where], …]. */
+  /** Largest differences of masses, centres and inertias, relative, and where: [[value, where], …].
+   * What the file fixes to the world exerts no force. */
   compareBodies() {
-    const {model} = this, total = sum(this.mechanism.bodies.map((body) => body.mass));
+    const {model} = this, bodies = this.mechanism.bodies.filter((body) => model.body_weldid[this.bodies[body.name] ?? -1] !== 0);
+    const total = sum(bodies.map((body) => body.mass)), there = sum(Array.from(model.body_mass).filter((_, id) => model.body_weldid[id] !== 0));
     const worst = {mass: [0, ''], centre: [0, ''], inertia: [0, '']};
     const note = (kind, value, where) => { if (!(value <= worst[kind][0])) worst[kind] = [value, where]; };
-    note('mass', Math.abs(sum(Array.from(model.body_mass.slice(1))) - total) / total, 'in all');
-    for (const body of this.mechanism.bodies.slice(1)) {
+    note('mass', Math.abs(there - total) / total, 'in all');
+    for (const body of bodies) {
       const id = this.bodies[body.name];
       if (id === undefined) {  // a piece between joints
         if (body.mass !== 0) note('mass', 1, body.name);
@@ -263,10 +266,19 @@ export class Robot {
     };
   }
 
+  // J̇q̇ that MuJoCo leaves out of the equality in row r: of q₁ = Σ aᵢ xⁱ, x = q₂ − q₂₀, it is
+  // −ẋ² Σ i (i − 1) aᵢ xⁱ⁻².
+  curvature(r) {
+    const {mj, model, data} = this, id = data.efc_id[r], joint = model.eq_obj2id[id];
+    if (model.eq_type[id] !== mj.mjtEq.mjEQ_JOINT.value || joint < 0) return 0;
+    const x = data.qpos[model.jnt_qposadr[joint]] - model.qpos0[model.jnt_qposadr[joint]], v = data.qvel[model.jnt_dofadr[joint]];
+    return -v * v * sum([2, 3, 4].map((i) => i * (i - 1) * model.eq_data[EQUALITY_DATA * id + i] * x ** (i - 2)));
+  }
+
   // J̇q̇ of rows() but the drives', after mj_forward.
   bias() {
     const {mj, model, data} = this, three = (list, body) => Array.from(list.slice(6 * body, 6 * body + 3));
-    const ofLoops = equalityBias(data);
+    const ofLoops = equalityBias(data).map((bias, r) => bias + this.curvature(r));
     data.qacc.fill(0);
     mj.mj_rnePostConstraint(model, data);
     return [...ofLoops, ...this.held.map(() => 0), ...this.spins.map((spin) => {

@@ -25,15 +25,16 @@ namespace mbv {
 namespace {
 
 using internal::FindRank;
+using internal::kReactionTolerance;
 using internal::kStressTolerance;
 using internal::NullSpaces;
 using internal::RankFinding;
 using internal::RankOf;
 using internal::RowStack;
 
-bool ActsOn(const MatX& self_stress, int first_row, int rows) {
+bool ActsOn(const MatX& self_stress, int first_row, int rows, double tolerance) {
   return rows > 0 && self_stress.cols() > 0 &&
-         self_stress.middleRows(first_row, rows).cwiseAbs().maxCoeff() > kStressTolerance;
+         self_stress.middleRows(first_row, rows).cwiseAbs().maxCoeff() > tolerance;
 }
 
 // The rows that transmit reactions (isostatic rule applied), then those of everything driven.
@@ -77,7 +78,7 @@ UndeterminedReaction OpenComponents(const Joint& joint, const ConstraintRows& ro
   }
   UndeterminedReaction reaction{joint.name, {}};
   for (size_t c = 0; c < kReactionComponents.size(); ++c) {
-    const bool open = most[static_cast<Eigen::Index>(c)] > kStressTolerance;
+    const bool open = most[static_cast<Eigen::Index>(c)] > kReactionTolerance;
     if (open) reaction.components.emplace_back(kReactionComponents[c]);
   }
   return reaction;
@@ -92,13 +93,15 @@ void FindForcesNotUnique(const Mechanism& mechanism, const BodyStates& states, d
   const MatX self_stress = FindRank(reactions.stack.Matrix(), NullSpaces::kSelfStress).self_stress;
   const std::vector<int>& first_row = reactions.first_row;
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
-    if (!ActsOn(self_stress, first_row[j], first_row[j + 1] - first_row[j])) continue;
+    if (!ActsOn(self_stress, first_row[j], first_row[j + 1] - first_row[j], kReactionTolerance)) {
+      continue;
+    }
     mobility->joints_not_unique.push_back(mechanism.joints[j].name);
     mobility->reactions_not_unique.push_back(OpenComponents(
         mechanism.joints[j], reactions.rows[j], states, length, self_stress, first_row[j]));
   }
   for (size_t d = 0; d < mechanism.drives.size(); ++d) {
-    if (ActsOn(self_stress, reactions.first_drive + static_cast<int>(d), 1)) {
+    if (ActsOn(self_stress, reactions.first_drive + static_cast<int>(d), 1, kStressTolerance)) {
       mobility->drives_not_unique.push_back(mechanism.drives[d].name);
     }
   }

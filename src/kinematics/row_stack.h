@@ -18,6 +18,9 @@ inline constexpr double kRankTolerance = 1e-9;
 /// A self-stress with a smaller share than this in a row does not act there. An order below what
 /// reactions that statics determines may differ by.
 inline constexpr double kStressTolerance = 1e-8;
+/// The same of a component of a reaction, which is compared on its own scale: a thousandth of all.
+/// Frames that fit but for their eighth digit let a self-stress reach it by as much.
+inline constexpr double kReactionTolerance = 1e-10;
 
 using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 

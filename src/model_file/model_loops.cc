@@ -31,6 +31,7 @@ struct DataProjection {
   /// another reason.
   int redundant = 0;
   bool closed = false;       ///< the joint frames were moved, and home is solved with them
+  bool began = false;        ///< all poses of the way's first reach close
   double moved_m = kNan;     ///< largest displacement of a joint frame
   double turned_rad = kNan;  ///< largest turn
 };
@@ -52,15 +53,18 @@ constexpr double kReach = 2.4;           // of the poses from home [rad, L]
 constexpr double kLeastDamping = 1e-12;  // over the residual
 
 // How frames are moved. Beyond singular poses rounding adds up without bound: then those nearer
-// home come first. Paradoxical loops need damped steps, which move frames farther than others do.
+// home come first, or alone: what closes there moves up to the singular pose. Paradoxical loops
+// need damped steps, which move frames farther than others do.
 enum class Steps { kClear, kClearThenDamped, kDamped };
 struct Way {
   std::vector<double> reaches;
   Steps steps = Steps::kClear;
 };
-const std::array<Way, 3> kWays = {{{{kReach}, Steps::kClear},
+const std::array<Way, 5> kWays = {{{{kReach}, Steps::kClear},
                                    {{0.6, kReach}, Steps::kClearThenDamped},
-                                   {{kReach}, Steps::kDamped}}};
+                                   {{0.6}, Steps::kClearThenDamped},
+                                   {{kReach}, Steps::kDamped},
+                                   {{0.2}, Steps::kClearThenDamped}}};
 
 constexpr Eigen::Index kMostUnknowns = 800;
 
@@ -360,6 +364,7 @@ DataProjection ProjectData(Mechanism* mechanism, double gap, const Way& way) {
       if (projector.unknowns() > kMostUnknowns) return projection;
       if (!projector.IsRounded()) break;
       if (!projector.Solve()) return projection;
+      projection.began = true;
       moved_m += projector.moved_m();
       turned_rad += projector.turned_rad();
       moved = projector.mechanism();
@@ -386,8 +391,11 @@ DataProjection ProjectData(Mechanism* mechanism, double gap, const Way& way) {
     projected.joints[j].guess = mechanism->joints[j].guess;
   }
   if (!closed) return projection;
-  // What was redundant but for the gap must be so now.
-  if (AnalyseMobility(projected).redundant != projection.redundant) return projection;
+  // What was redundant but for the gap must be so now. More may be: the third crank of a
+  // parallelogram is as far off as the gap is wide.
+  const int redundant = AnalyseMobility(projected).redundant;
+  if (redundant < projection.redundant) return projection;
+  projection.redundant = redundant;
   *mechanism = std::move(projected);
   projection.closed = true;
   return projection;
@@ -409,9 +417,15 @@ constexpr double kMovedDrive = 1e-3;
 bool Project(const ClosureRules& rules, double gap, const std::string& why, Mechanism* mechanism,
              ModelReport* report) {
   const double length_m = CharacteristicLength(*mechanism);
-  for (const Way& way : kWays) {
+  bool began = true;
+  for (size_t w = 0; w < kWays.size(); ++w) {
+    const Way& way = kWays[w];
+    const bool again = w > 0 && way.steps == kWays[w - 1].steps &&
+                       way.reaches.front() == kWays[w - 1].reaches.front();
+    if (again && !began) continue;
     Mechanism projected = *mechanism;
     const DataProjection projection = ProjectData(&projected, gap, way);
+    began = projection.began;
     const double moved_m = std::max(projection.moved_m, projection.turned_rad * length_m);
     if (!projection.closed || moved_m > rules.farthest_m) continue;
     *mechanism = std::move(projected);

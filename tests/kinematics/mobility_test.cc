@@ -78,6 +78,36 @@ TEST(Mobility, AComponentThatIsUniqueAtHomeOnlyIsFoundOutByOtherPoses) {
   EXPECT_EQ(ReactionsNotUnique(m, {turned}).size(), 3u);
 }
 
+// The same bar, which lies across x by `off`: the forces along it reach y by as much.
+TEST(Mobility, AReactionThatASelfStressReachesByTheEighthDigitIsOpen) {
+  const auto open = [](double off) {
+    Mechanism m;
+    m.bodies = {{.name = "world", .frames = {}, .shapes = {}},
+                {.name = "table", .mass = 1.0, .frames = {}, .shapes = {}},
+                {.name = "bar", .mass = 1.0, .frames = {}, .shapes = {}}};
+    const auto add = [&](const char* name, JointKind kind, int parent, int child, const Vec3& at) {
+      Joint joint;
+      joint.name = name;
+      joint.kind = kind;
+      joint.parent = parent;
+      joint.child = child;
+      joint.X_PF = joint.X_CM = Pose(Eigen::Translation3d(at));
+      m.joints.push_back(joint);
+    };
+    add("turn", JointKind::kRevolute, 0, 1, Vec3::Zero());
+    add("near", JointKind::kSpherical, 0, 2, Vec3::Zero());
+    add("far", JointKind::kSpherical, 1, 2, Vec3(1.0, off, 0.0));
+    m.X_WB_home.assign(3, Pose::Identity());
+    return ReactionsNotUnique(m, {});
+  };
+  const std::vector<std::string> along_x = {"far.reaction.fx", "near.reaction.fx",
+                                            "turn.reaction.fx"};
+  EXPECT_EQ(open(0.0), along_x);
+  EXPECT_EQ(open(2e-11), along_x);
+  EXPECT_EQ(open(4e-10).size(), 6u);
+  EXPECT_EQ(open(5e-9).size(), 6u);
+}
+
 // A plate in a plane, pushed by legs: two are parallel but for 1e-3, a third is across them.
 TEST(CommandRank, WhatHardlyDiffersFromOthersIsTakenWhereNothingBetterIsPreferred) {
   Mechanism m;

@@ -1001,6 +1001,20 @@ TEST(ForeignMjcf, WordsOfNewerVersionsAreTranslatedOrLeftOutWhereNoForceDependsO
   EXPECT_FALSE(ReadText(Arm({.joint = "type='of_tomorrow'"})).model);
 }
 
+// Terrain touches only: its file may be absent.
+TEST(ForeignMjcf, TerrainNeedsNoFile) {
+  for (const char* field :
+       {"file='hills.png'", "name='hills' file='x/absent.png'", "name='hills' nrow='3' ncol='4'",
+        "name='hills' nrow='2' ncol='3' elevation='0 1 0 1 0 1'"}) {
+    const Read read =
+        ReadText(Arm({.head = fmt::format("<asset><hfield size='5 4 0.2 0.1' {}/></asset>", field),
+                      .tail = "<worldbody><geom type='hfield' hfield='hills'/></worldbody>"}));
+    EXPECT_TRUE(read.model) << field << read.diagnostics.Text();
+  }
+  EXPECT_FALSE(
+      ReadText(Arm({.tail = "<worldbody><geom type='hfield' hfield='hills'/></worldbody>"})).model);
+}
+
 // Three slides and a ball carry a robot as a free joint does: held, or let go as one.
 TEST(ForeignMjcf, ABaseOnThreeSlidesAndABallFloats) {
   struct Base {
@@ -1014,20 +1028,23 @@ TEST(ForeignMjcf, ABaseOnThreeSlidesAndABallFloats) {
         R"(<inertial pos="0 0 0" mass="10" diaginertia="0.1 0.1 0.1"/>)"
         R"(<body name="leg"><joint name="hip" axis="0 1 0"/>)"
         R"(<inertial pos="0 0 -0.2" mass="1" diaginertia="0.01 0.01 0.001"/></body>)"
+        R"(<body name="arm"><joint axis="1 0 0"/>)"
+        R"(<inertial pos="0 0 -0.2" mass="1" diaginertia="0.01 0.01 0.001"/></body>)"
         R"(</body></worldbody>{}</mujoco>)",
         base.place, base.slide, base.joint, base.tail);
   };
   const Read held = ReadText(text({}));
   ASSERT_TRUE(held.model) << held.diagnostics.Text();
-  EXPECT_EQ(held.model->mechanism.joints.size(), 2U);
+  ASSERT_EQ(held.model->mechanism.joints.size(), 3U);
   EXPECT_EQ(held.model->mechanism.joints[0].kind, JointKind::kFixed);
+  EXPECT_EQ(held.model->mechanism.joints[2].name, "joint_5");  // MuJoCo's number of the file
   EXPECT_NE(held.diagnostics.Text().find("three slides and a ball of 'pelvis' are read as one"),
             std::string::npos);
   EXPECT_TRUE(Sources(held).contains("body/freejoint"));
-  const std::string key = "<keyframe><key qpos='0 0 {} 1 0 0 0 0.1'/></keyframe>";
+  const std::string key = "<keyframe><key qpos='0 0 {} 1 0 0 0 0.1 0'/></keyframe>";
   EXPECT_EQ(
       ReadText(text({.tail = fmt::format(fmt::runtime(key), 1)})).model->mechanism.joints.size(),
-      2U);
+      3U);
   // What acts along one of them, or names it, keeps them.
   const Base kept[] = {{.slide = "damping='1'"},
                        {.slide = "armature='0.1'"},
@@ -1041,7 +1058,7 @@ TEST(ForeignMjcf, ABaseOnThreeSlidesAndABallFloats) {
   for (const Base& base : kept) {
     const Read read = ReadText(text(base));
     ASSERT_TRUE(read.model) << read.diagnostics.Text();
-    EXPECT_EQ(read.model->mechanism.joints.size(), 5U)
+    EXPECT_EQ(read.model->mechanism.joints.size(), 6U)
         << base.place << base.slide << base.joint << base.tail;
   }
 }

@@ -115,3 +115,18 @@ test('Drive forces of a rod that a universal joint keeps from spinning, and not 
   assert.ok(!isWithin(other) && other.moving > MOVING, JSON.stringify(other));
   fs.rmSync(scratch, {recursive: true});
 });
+
+// A lever that follows a crank by a curve. MuJoCo has no velocity term of such equalities.
+test('Drive forces of joints on a curve are those of the import, and not with another curvature', {skip: !process.env.MBVERIFY && 'MBVERIFY is not set'}, () => {
+  const scratch = fs.mkdtempSync(path.join(os.tmpdir(), 'robots_newest_test'));
+  const whole = fileURLToPath(new URL('robots/curved_lever.xml', import.meta.url));
+  const check = (change) => checkFile(engine, process.env.MBVERIFY, whole, scratch, change);
+  const row = check();
+  assert.ok(isWithin(row) && row.moving < 1e-11, JSON.stringify(row));
+  assert.deepEqual(row.notes, []);
+  for (const [i, text] of [[2, ' 0.6 '], [3, ' -0.4 '], [4, ' 0.3"']]) {
+    const other = check((file) => file.replace(text, text.replace(/[\d.-]+/, (a) => Number(a) * (1 + 1e-3))));
+    assert.ok(!isWithin(other) && other.moving > MOVING, `coefficient ${i}: ${JSON.stringify(other)}`);
+  }
+  fs.rmSync(scratch, {recursive: true});
+});

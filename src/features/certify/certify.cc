@@ -1377,9 +1377,23 @@ Eigen::Index RowAt(const Trace& trace, double time_s) {
   return at - trace.time_s.begin();
 }
 
+// Half-width of the band that resting friction leaves a force, of which the middle is proved: the
+// narrowest that a trace states. A witness that states none gives a number of the band.
+double BandAt(const std::vector<CertifiedTrace>& traces, const Channel& force, double time_s) {
+  double narrowest = kInfinity;
+  for (const CertifiedTrace& trace : traces) {
+    const Eigen::Index row = RowAt(*trace.trace, time_s);
+    const int column = trace.trace->Find(force.name + ".band");
+    if (row >= 0 && column >= 0) {
+      narrowest = std::min(narrowest, trace.trace->values(row, column));
+    }
+  }
+  return std::isfinite(narrowest) ? narrowest : 0.0;
+}
+
 void Compare(const CertifiedTrace& of, const Mechanism& mechanism, double duration_s,
-             const std::vector<SampleProof>& samples, double computed_limit,
-             std::vector<WitnessProof>* proofs) {
+             const std::vector<CertifiedTrace>& traces, const std::vector<SampleProof>& samples,
+             double computed_limit, std::vector<WitnessProof>* proofs) {
   WitnessProof proof;
   proof.witness = of.witness;
   proof.engine = of.engine;
@@ -1394,20 +1408,22 @@ void Compare(const CertifiedTrace& of, const Mechanism& mechanism, double durati
       const double stated = of.trace->values(row, column);
       if (!std::isfinite(stated)) continue;
       const double largest = scales.Of(static_cast<size_t>(column));
-      const double off =
-          std::abs(stated - value.value) + value.radius + kEps * std::abs(value.value);
+      const Channel& channel = of.trace->channels[static_cast<size_t>(column)];
+      const Quantity quantity = channel.quantity;
+      const bool force = quantity == Quantity::kForce || quantity == Quantity::kBaseForce;
+      double apart = std::abs(stated - value.value);
+      if (force && of.trace->Find(channel.name + ".band") < 0) {
+        apart = std::max(0.0, apart - BandAt(traces, channel, sample.time_s));
+      }
+      const double off = apart + value.radius + kEps * std::abs(value.value);
       const double error = largest > 0.0 ? off / largest : off > value.radius ? kInfinity : 0.0;
       ++proof.values;
-      const Quantity quantity = of.trace->channels[static_cast<size_t>(column)].quantity;
-      const bool force = quantity == Quantity::kForce || quantity == Quantity::kBaseForce;
       double& kind = force                             ? proof.force_error
                      : quantity == Quantity::kReaction ? proof.reaction_error
                                                        : proof.motion_error;
       if (quantity == Quantity::kReaction) ++proof.reactions;
       if (force && largest > 0.0) {
-        const double least =
-            (std::abs(stated - value.value) - value.radius - kEps * std::abs(value.value)) /
-            largest;
+        const double least = (apart - value.radius - kEps * std::abs(value.value)) / largest;
         proof.force_error_at_least = std::max(proof.force_error_at_least, least);
       }
       if (!(error > kind)) continue;
@@ -1510,7 +1526,7 @@ Certificate Certify(const Mechanism& mechanism, const Motion& motion,
     if (!reached.ok()) break;
   }
   for (const CertifiedTrace& trace : traces) {
-    Compare(trace, mechanism, motion.duration_s, certificate.samples, options.limit,
+    Compare(trace, mechanism, motion.duration_s, traces, certificate.samples, options.limit,
             &certificate.witnesses);
   }
   double open = 0.0;

@@ -14,8 +14,10 @@
 #include "cli/files.h"
 #include "cli/options.h"
 #include "cli/terminal.h"
+#include "features/run/default_setup.h"
 #include "features/run/run_scenario.h"
 #include "model_file/catalogue.h"
+#include "model_file/load_model.h"
 #include "report/html_report.h"
 #include "report/sizing.h"
 
@@ -367,6 +369,23 @@ int PrintSized(const SizeArguments& arguments, const Catalogue& catalogue, Sized
   return WorseExit(exit_code, arguments.json.Write(json, {}));
 }
 
+// A robot's file is sized by a first motion, which is left to go on from.
+bool SetUpRobot(const SizeArguments& arguments, std::string* file) {
+  const DefaultSetupResult made = MakeDefaultSetup(*file, "", "./model.yaml");
+  SayText(stderr, made.diagnostics.Text());
+  if (!made.setup) return false;
+  std::string scenario;
+  const std::string trouble =
+      WriteSetup(*made.setup, arguments.out.empty() ? "out" : arguments.out, &scenario);
+  if (!trouble.empty()) {
+    Say(stderr, "error: {}\n", trouble);
+    return false;
+  }
+  Say(stderr, "{} is sized by {}; go on from there\n", *file, scenario);
+  *file = scenario;
+  return true;
+}
+
 int RunSize(const SizeArguments& arguments) {
   RunOptions options;
   options.out_dir.clear();
@@ -384,9 +403,12 @@ int RunSize(const SizeArguments& arguments) {
     const int refused = RefuseInput(arguments.json.path(), arguments.catalogue);
     if (refused != 0) return refused;
   }
+  std::vector<std::string> scenarios = arguments.scenarios;
+  for (std::string& file : scenarios) {
+    if (IsRobotFile(file) && !SetUpRobot(arguments, &file)) return 2;
+  }
   int exit_code = 0;
-  const std::vector<std::string> files =
-      FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
+  const std::vector<std::string> files = FilesToRun(scenarios, {arguments.json.path()}, &exit_code);
   if (exit_code == 0) {
     exit_code = AskForPrograms(files, options.scenario, arguments.trust, false, &options.programs);
   }
@@ -405,7 +427,8 @@ void AddSizeCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<SizeArguments>();
   CLI::App* size = app->add_subcommand(
       "size", "What several scenarios ask of the motors: the largest of each, and the margin");
-  size->add_option("scenarios", arguments->scenarios, "scenario files or folders of one mechanism")
+  size->add_option("scenarios", arguments->scenarios,
+                   "scenario files or folders of one mechanism, or a robot's file")
       ->required();
   size->add_option("--margin", arguments->margin, "smaller ones end with exit code 1")
       ->check(Positive())

@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
+#include <utility>
+#include <vector>
 
+#include "base/files.h"
 #include "base/text.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
@@ -622,6 +626,22 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   }
   result.setup = std::move(setup);
   return result;
+}
+
+std::string WriteSetup(const DefaultSetup& setup, const std::string& folder,
+                       std::string* scenario) {
+  const std::filesystem::path place =
+      std::filesystem::path(folder) / setup.mechanism.name / "setup";
+  std::vector<std::pair<std::filesystem::path, std::string>> files = {
+      {place / "model.yaml", setup.model}, {place / "first.yaml", setup.scenario}};
+  for (const ModelMeshFile& mesh : setup.meshes) {
+    files.emplace_back(place / mesh.path, mesh.content);
+  }
+  for (const auto& [path, text] : files) {
+    if (std::string trouble = WriteFile(path, text); !trouble.empty()) return trouble;
+  }
+  *scenario = (place / "first.yaml").string();
+  return "";
 }
 
 }  // namespace mbv

@@ -62,4 +62,9 @@ struct DefaultSetupResult {
                                                   const std::string& model_ref,
                                                   const LoadOptions& options = {});
 
+/// Writes the files of a setup, whose model_ref is "./model.yaml", to `folder`/NAME/setup; empty,
+/// or what kept it from that. `scenario`: path of first.yaml, beside model.yaml.
+[[nodiscard]] std::string WriteSetup(const DefaultSetup& setup, const std::string& folder,
+                                     std::string* scenario);
+
 }  // namespace mbv

@@ -166,28 +166,17 @@ bool SetUpRobot(const std::string& robot, const RunArguments& arguments, Finding
   const DefaultSetupResult made = MakeDefaultSetup(robot, "", "./model.yaml", options);
   findings->Print(made.diagnostics);
   if (!made.setup) return false;
-  const std::filesystem::path folder =
-      std::filesystem::path(arguments.out) / made.setup->mechanism.name / "setup";
-  const std::filesystem::path model = folder / "model.yaml", first = folder / "first.yaml";
-  std::vector<std::pair<std::filesystem::path, std::string>> files = {
-      {model, made.setup->model}, {first, made.setup->scenario}};
-  for (const ModelMeshFile& mesh : made.setup->meshes) {
-    files.emplace_back(folder / mesh.path, mesh.content);
+  const std::string trouble = WriteSetup(*made.setup, arguments.out, scenario);
+  if (!trouble.empty()) {
+    Say(stderr, "error: {}\n", trouble);
+    return false;
   }
-  for (const auto& [path, text] : files) {
-    const std::string trouble = WriteFile(path, text);
-    if (!trouble.empty()) {
-      Say(stderr, "error: {}\n", trouble);
-      return false;
-    }
-  }
-  findings->AddMadeModel(model);
+  findings->AddMadeModel(std::filesystem::path(*scenario).replace_filename("model.yaml"));
   if (!arguments.quiet) {
     const std::string model = CompletedModel(robot);
     Say(stderr, "{}{} is run by {}; go on from there\n", robot,
-        model == robot ? "" : ", completed by " + model + ",", first.string());
+        model == robot ? "" : ", completed by " + model + ",", *scenario);
   }
-  *scenario = first.string();
   return true;
 }
 

@@ -286,6 +286,7 @@ struct ForeignMjcf::Impl {
       if (in_assets && (IsTag(e, "texture") || IsTag(e, "material") || IsTag(e, "skin"))) {
         others.push_back(e);
       }
+      if (in_assets && IsTag(e, "hfield")) FlattenTerrain(e);
       if (e->Parent() != root()) return;
       for (const char* section : {"visual", "sensor"}) {
         if (IsTag(e, section)) others.push_back(e);
@@ -303,6 +304,18 @@ struct ForeignMjcf::Impl {
     });
     for (XMLElement* e : others) document.DeleteNode(e);
     DropUnusedMeshes();
+  }
+
+  // Heights touch only, and their file may be absent.
+  static void FlattenTerrain(XMLElement* e) {
+    const char* file = e->Attribute("file");
+    if (file != nullptr && e->Attribute("name") == nullptr) {
+      e->SetAttribute("name", fs::path(file).stem().string().c_str());
+    }
+    for (const char* attribute : {"file", "elevation", "content_type"}) {
+      e->DeleteAttribute(attribute);
+    }
+    for (const char* attribute : {"nrow", "ncol"}) e->SetAttribute(attribute, 2);
   }
 
   void DropUnusedMeshes() {
@@ -563,17 +576,39 @@ struct ForeignMjcf::Impl {
   // Three slides along the axes and a ball under a body of the world move it as a free joint does.
   // Where anything acts along one of them or names it they stay what they are.
   void JoinFloatingBases() {
+    bool numbered = false;
     XMLElement* world = root()->FirstChildElement("worldbody");
     for (; world != nullptr; world = world->NextSiblingElement("worldbody")) {
       for (XMLElement* body = world->FirstChildElement("body"); body != nullptr;
            body = body->NextSiblingElement("body")) {
         if (!IsFloatingBase(body)) continue;
+        if (!std::exchange(numbered, true)) NumberJoints();
         body->InsertAfterChild(body->FirstChildElement("joint"), document.NewElement("freejoint"));
         while (XMLElement* joint = body->FirstChildElement("joint")) body->DeleteChild(joint);
         const char* name = body->Attribute("name");
         Add(Severity::kWarning, body->GetLineNum(),
             fmt::format("three slides and a ball of {} are read as one free joint",
                         name == nullptr ? "a body" : fmt::format("'{}'", name)));
+      }
+    }
+  }
+
+  // Joints without a name keep MuJoCo's number of the file as it is.
+  void NumberJoints() {
+    std::set<std::string> names;
+    std::vector<XMLElement*> joints;
+    XMLElement* world = root()->FirstChildElement("worldbody");
+    for (; world != nullptr; world = world->NextSiblingElement("worldbody")) {
+      ForEach(world, [&](XMLElement* e) {
+        if (!IsTag(e, "joint") && !IsTag(e, "freejoint")) return;
+        joints.push_back(e);
+        if (e->Attribute("name") != nullptr) names.insert(e->Attribute("name"));
+      });
+    }
+    for (size_t k = 0; k < joints.size(); ++k) {
+      const std::string name = fmt::format("joint_{}", k);
+      if (joints[k]->Attribute("name") == nullptr && !names.contains(name)) {
+        joints[k]->SetAttribute("name", name.c_str());
       }
     }
   }

@@ -230,6 +230,42 @@ TEST(Certify, KnowsEveryForceElement) {
 }
 
 // 240 bits against 113: each value of the finer one lies in the coarser enclosure.
+// Where friction rests, the middle of the band is proved. A program that states a number has any of
+// the band; one beside it is wrong by what it is beside it.
+TEST(Certify, ANumberInTheBandOfRestingFrictionIsRight) {
+  Mechanism mechanism = FromText(kLeaning);
+  mechanism.elements.push_back({.name = "dry",
+                                .joint = 0,
+                                .coordinate = 0,
+                                .law = FrictionLaw{.coulomb = 2.0, .breakaway = 2.0}});
+  const Motion motion = LegMotion({{ConstantTerm{5.0}}});
+  const ReferenceRun run = RunReference(mechanism, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const int band = run.trace.Find("leg.force.band"), force = run.trace.Find("leg.force");
+  ASSERT_GE(band, 0);
+  const double half = run.trace.values(0, band);
+  EXPECT_NEAR(half, 2.0 * 5.0 / 4.0, 1e-12);  // 2 N along the guide
+  const auto off = [&](double share) {
+    Trace other;
+    other.time_s = run.trace.time_s;
+    other.channels = {run.trace.channels[static_cast<size_t>(force)]};
+    other.values = run.trace.values.col(force).array() + share * half;
+    const Certificate certificate =
+        Certify(mechanism, motion, {{"reference", &run.trace}, {"other", &other}});
+    EXPECT_EQ(certificate.proved(), certificate.samples.size());
+    EXPECT_EQ(certificate.witnesses.size(), 2u);
+    return certificate.witnesses.back();
+  };
+  for (const double share : {-0.999, 0.0, 0.7}) {
+    EXPECT_FALSE(off(share).wrong) << share;
+    EXPECT_GE(off(share).digits(), 13.0) << share;
+  }
+  for (const double share : {-1.001, 1.001}) {
+    EXPECT_TRUE(off(share).wrong) << share;
+    EXPECT_GT(off(share).force_error_at_least, 1e-5) << share;
+  }
+}
+
 TEST(CertifyShipped, CoarseIntervalsHoldFineValues) {
   size_t values = 0;
   for (const char* name :

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -49,6 +50,28 @@ class SizeCommand : public testing::Test {
 
 const double kForce = 0.2 * std::pow(2 * std::numbers::pi, 2);  // of the fast motion
 const double kMargin = 6.0 / (kForce / std::sqrt(2.0));
+
+// A cart of 2 kg in MJCF, up and down: a motor with 4 N per unit of control.
+TEST_F(SizeCommand, TakesARobotsFileAsItIs) {
+  const auto robot = [](double most) {
+    return fmt::format(
+        R"(<mujoco model="lift"><worldbody><body name="cart"><joint name="up" type="slide" axis="0 0 1"/>)"
+        R"(<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></worldbody><actuator>)"
+        R"(<motor name="m" joint="up" gear="4" ctrlrange="-{0} {0}"/></actuator></mujoco>)",
+        most);
+  };
+  Write("lift.xml", robot(10));
+  const ProgramResult fits = mbverify("size " + File("lift.xml") + Out());
+  EXPECT_EQ(fits.exit_code, 0) << fits.out << fits.err;
+  EXPECT_NE(fits.out.find("peak, setup/first"), std::string::npos) << fits.out;
+  EXPECT_NE(fits.err.find("is sized by"), std::string::npos) << fits.err;
+  EXPECT_TRUE(std::filesystem::exists(File("out/lift/setup/first.yaml")));
+  // It bears 2 · 9.81 N at rest; the motor has 4 · 4.9 N.
+  Write("lift.xml", robot(4.9));
+  EXPECT_EQ(mbverify("size " + File("lift.xml") + Out()).exit_code, 1);
+  Write("lift.xml", "<mujoco");
+  EXPECT_EQ(mbverify("size " + File("lift.xml") + Out()).exit_code, 2);
+}
 
 TEST_F(SizeCommand, EnvelopesScenarios) {
   const ProgramResult result = mbverify("size " + File("slow.yaml") + " " + File("fast.yaml") +
