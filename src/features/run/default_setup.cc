@@ -600,7 +600,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
       resting.push_back(drive.name);
     }
   }
-  const FirstMotion motion = FindFirstMotion(m, resting);
+  FirstMotion motion = FindFirstMotion(m, resting);
   if (!motion.found && !m.drives.empty()) {
     setup.notes.emplace_back(
         by_forces.empty()
@@ -616,6 +616,20 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   }
   if (motion.beyond_ranges) {
     setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");
+  }
+  // What falls would rest at the end of its range, on a stop that no mechanism here has.
+  std::vector<std::string> falling;
+  for (const Coordinate& turn : by_forces) {
+    const Joint& joint = m.joints[static_cast<size_t>(turn.index)];
+    const bool named = !falling.empty() && falling.back() == joint.name;
+    if (std::isfinite(joint.max_rotation) && !named) falling.push_back(joint.name);
+  }
+  if (!falling.empty() && !motion.beyond_ranges) {
+    motion.beyond_ranges = true;
+    setup.notes.push_back(
+        fmt::format("{} may leave the range by forces, as nothing here stops it there: ranges are "
+                    "ignored",
+                    Joined(falling, kMostNames)));
   }
   setup.meshes = TakeMeshesAlong(&m);
   setup.model = WriteModel(m, caveats);

@@ -259,6 +259,29 @@ TEST(DefaultSetup, SpinsOfRodsAreHeldBesideOtherRotationsThatForcesMove) {
   EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("swing"))].kind, JointKind::kSpherical);
 }
 
+// A bob on a ball that falls sideways, beyond its range: no stop holds it there, and it runs.
+TEST(DefaultSetup, WhatFallsBeyondItsRangeRunsAndSaysSo) {
+  const test::TestFolder folder("falling_bob");
+  const auto bob = [](const char* range) {
+    return fmt::format(
+        "name: bob\nbodies:\n  arm: {{mass: 1, com: [0.1, 0, 0], inertia: [0.01, 0.02, 0.02]}}\n"
+        "  bob: {{mass: 1, com: [0.3, 0, 0.01], inertia: [0.003, 0.012, 0.01]}}\njoints:\n"
+        "  turn: {{kind: revolute, parent: world, child: arm, axis: z}}\n"
+        "  swing: {{kind: spherical, parent: arm, child: bob{}}}\n"
+        "drives: {{turn: {{kind: joint, joint: turn}}}}\n",
+        range);
+  };
+  const std::string note = "swing may leave the range by forces";
+  const std::string limited = folder.Write("limited.yaml", bob(", range: [0, 0.5]"));
+  const SurveyRow row = SurveyFile(limited, folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  const DefaultSetupResult made = MakeDefaultSetup(limited, "", "./model.yaml");
+  EXPECT_NE(made.diagnostics.Text().find(note), std::string::npos) << made.diagnostics.Text();
+  const DefaultSetupResult free =
+      MakeDefaultSetup(folder.Write("free.yaml", bob("")), "", "./model.yaml");
+  EXPECT_EQ(free.diagnostics.Text().find(note), std::string::npos);
+}
+
 // One that is symmetric about its line spins idly.
 TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   std::string round = kRod;
