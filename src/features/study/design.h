@@ -84,7 +84,7 @@ struct Axis {
 /// other: how far their estimates lie apart is how far off they are. One design alone does not show
 /// how much less than independent points its even spread errs [L'Ecuyer, Nakayama, Owen, Tuffin
 /// 2023, "Confidence intervals for randomized quasi-Monte Carlo estimators"].
-inline constexpr std::uint64_t kReplicates = 16;
+inline constexpr std::uint64_t kReplicates = 8;
 
 inline constexpr size_t kMostAxes = 1000;  ///< Sobol's sequence has 3667 dimensions
 
