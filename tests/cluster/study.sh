@@ -21,11 +21,11 @@ need() {  # PROGRAM…
 }
 fail() { echo "failed: $1"; exit 1; }
 
-# A shipped study of 4 s of the motion, with eight points in each shard: about 1 s. A blank in the
+# A shipped study of 40 s of the motion, with eight points in each shard: about 1 s. A blank in the
 # name belongs to it.
 make_study() {
   local shipped=$source_dir/scenarios/stabilizing_platform
-  sed 's|^  duration_s: .*|  duration_s: 4|; s|^snapshots:|snapshots: {}|; /times_s:/d' \
+  sed 's|^  duration_s: .*|  duration_s: 40|; s|^snapshots:|snapshots: {}|; /times_s:/d' \
     "$shipped/sea_state.yaml" >sea_state.yaml
   sed 's|^design: .*|design: {latin_hypercube: 48}|' "$shipped/study_tolerances.yaml" >'my study.yaml'
   grep -q 48 'my study.yaml' || fail "the shipped study has another design"
