@@ -194,8 +194,8 @@ TEST(Statistics, ClopperPearsonIsExact) {
 }
 
 TEST(Statistics, HistogramsCountEveryValue) {
-  std::vector<double> values;
-  for (int i = 0; i < 1000; ++i) values.push_back(i * 0.001);
+  std::vector<double> values(1000);
+  for (int i = 0; i < 1000; ++i) values[static_cast<size_t>(i)] = i * 0.001;
   const Histogram histogram = HistogramOf(values);
   std::uint64_t sum = 0;
   for (const auto count : histogram.counts) sum += count;
