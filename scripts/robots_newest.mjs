@@ -442,7 +442,8 @@ async function main([program, ...folders]) {
       try {
         row = checkFile(engine, program, path.resolve(file), scratch);
       } catch (error) {
-        row = {file, refused: messageOf(engine, error).split('\n')[0].slice(0, 160), notes: []};
+        // Folders that a file names are those of its author's machine.
+        row = {file, refused: messageOf(engine, error).split('\n')[0].replace(/\/(?:[^/'"\s]+\/)+/g, '').slice(0, 160), notes: []};
       }
       if (!row.refused && !isWithin(row) && row.notes.length === 0) worst = 1;
       console.log(line(row, fs.statSync(folder).isFile() ? path.dirname(folder) : folder));

@@ -485,23 +485,28 @@ std::vector<int> FreeMotion::BranchesAt(const State& x, double t_s) const {
   return branches;
 }
 
+template <typename Stays>
+double FreeMotion::TimeOfChange(double h, const Stays& stays) {
+  const State from = Pack(now_);
+  double before = 0.0, beyond = h;
+  while (beyond - before > kCornerShare * h) {
+    const double t = 0.5 * (before + beyond);
+    (stays(StepFrom(from, t), t) ? before : beyond) = t;
+    if (!std::exchange(trouble_, RunSummary::Done()).ok()) return h;
+  }
+  return before == 0.0 ? 0.0 : beyond;
+}
+
 FreeMotion::BranchEnd FreeMotion::TimeToBranch(double h, const State& to) {
   const std::vector<int>& now = now_.states.branches;
   BranchEnd end{.after_s = h, .next = BranchesAt(to, now_.time_s + h)};
   if (end.next == now) return end;
-  const State from = Pack(now_);
-  double before = 0.0;
-  while (end.after_s - before > kCornerShare * h) {
-    const double t = 0.5 * (before + end.after_s);
-    std::vector<int> at = BranchesAt(StepFrom(from, t), now_.time_s + t);
-    if (!std::exchange(trouble_, RunSummary::Done()).ok()) return {.after_s = h, .next = now};
-    if (at == now) {
-      before = t;
-    } else {
-      end = {.after_s = t, .next = std::move(at)};
-    }
-  }
-  if (before == 0.0) end.after_s = 0.0;
+  end.after_s = TimeOfChange(h, [&](const State& x, double after_s) {
+    std::vector<int> at = BranchesAt(x, now_.time_s + after_s);
+    if (at == now) return true;
+    end.next = std::move(at);
+    return false;
+  });
   return end;
 }
 
@@ -548,16 +553,11 @@ void FreeMotion::NoteCorners() {
 // Where some law is on another piece after the step: the time just beyond the corner. A corner at
 // the very start is none.
 double FreeMotion::TimeToCorner(double h, const State& to) {
-  const State from = Pack(now_);
-  const std::vector<int> pieces = PiecesAt(from);
+  const std::vector<int> pieces = PiecesAt(Pack(now_));
   if (PiecesAt(to) == pieces) return h;
-  double before = 0.0, beyond = h;
-  while (beyond - before > kCornerShare * h) {
-    const double t = 0.5 * (before + beyond);
-    (PiecesAt(StepFrom(from, t)) == pieces ? before : beyond) = t;
-    if (!std::exchange(trouble_, RunSummary::Done()).ok()) return h;
-  }
-  return before == 0.0 || beyond < kSmallestStepShare * duration_s_ ? h : beyond;
+  const double t =
+      TimeOfChange(h, [&](const State& x, double /*after_s*/) { return PiecesAt(x) == pieces; });
+  return t < kSmallestStepShare * duration_s_ ? h : t;
 }
 
 RunSummary FreeMotion::AdvanceTo(double t_s) {

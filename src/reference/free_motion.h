@@ -105,6 +105,10 @@ class FreeMotion {
   [[nodiscard]] BranchEnd TimeToBranch(double h, const State& to);
   [[nodiscard]] RunSummary TakeBranches(std::vector<int> branches);
   [[nodiscard]] double TimeToCorner(double h, const State& to);
+  /// Where `stays(state, time after now)` does not hold at h: a time just beyond which it does not,
+  /// 0 where that is at once; h where no step leads there.
+  template <typename Stays>
+  [[nodiscard]] double TimeOfChange(double h, const Stays& stays);
   void NoteFriction();
   void NoteCorners();
   [[nodiscard]] RunSummary SampleBridge(double t_s);

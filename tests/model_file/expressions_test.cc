@@ -258,6 +258,17 @@ TEST(ExpressionBranches, OfConstantsAreNone) {
   }
 }
 
+TEST(ExpressionBranches, OfOneDecisionAreTwoHoweverOftenItStands) {
+  std::string text = "0";
+  for (int i = 0; i < 40; ++i) text += "+abs(x-1)";
+  Scope scope;
+  const FormulaResult compiled = scope.Compile(text, {"x"});
+  ASSERT_NE(compiled.formula, nullptr) << compiled.error;
+  EXPECT_EQ(compiled.formula->BranchAt(std::array{0.5}), 0);
+  EXPECT_EQ(compiled.formula->BranchAt(std::array{1.5}), 1);
+  EXPECT_EQ(compiled.formula->OnBranch(1, std::array{0.5}), -20.0);
+}
+
 TEST(ExpressionBranches, AreNotEndless) {
   std::string text = "0";
   for (int i = 0; i < 40; ++i) text += "+abs(x-" + std::to_string(i) + ")";

@@ -189,21 +189,31 @@ TEST(WarnNotApplicable, TheWorkspaceOfAnotherMechanismIsRefused) {
   EXPECT_FALSE(ComputeWorkspace(heavy, false).diagnostics.has_errors());
 }
 
-TEST(WarnNotApplicable, AnElasticModelWithAnotherBeam) {
-  const Copy copy("beam");
+// The elastic SCARA robot, away from the shipped models.
+std::string ElasticModel() {
   std::string model = ReadShipped("models/scara_robot/elastic.yaml");
   Replace("parameters_from: model.yaml",
           "parameters_from: \"" + SourcePath("/models/scara_robot/model.yaml") + "\"", &model);
-  Replace("beams: {bar: {from: D, to: B, section: rod,",
-          "beams: {bar: {from: D, to: B, section: stout,", &model);
-  Replace("sections: {rod:", "sections: {stout: {round: {diameter: 0.012}}, rod:", &model);
+  return model;
+}
+RunOutcome StiffnessOf(const Copy& copy, const std::string& model) {
   copy.Model(model);
   const std::string scenario =
       copy.Scenario(ReadShipped("scenarios/scara_robot/stiffness.yaml"), "scara_robot");
   RunOptions options;
   options.pictures = false;
-  const RunOutcome outcome = RunScenario(scenario, options);
+  RunOutcome outcome = RunScenario(scenario, options);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.diagnostics.Text();
+  return outcome;
+}
+
+TEST(WarnNotApplicable, AnElasticModelWithAnotherBeam) {
+  std::string model = ElasticModel();
+  Replace("beams: {bar: {from: D, to: B, section: rod,",
+          "beams: {bar: {from: D, to: B, section: stout,", &model);
+  Replace("sections: {rod:", "sections: {stout: {round: {diameter: 0.012}}, rod:", &model);
+  const Copy copy("beam");
+  const RunOutcome outcome = StiffnessOf(copy, model);
   EXPECT_NE(outcome.diagnostics.Text().find(
                 "analytic is not applicable: beam limb1.bar: area is 0.000113097"),
             std::string::npos)
@@ -228,17 +238,8 @@ TEST(WarnNotApplicable, AnElasticModelWithAnotherBeam) {
 TEST(WarnNotApplicable, AStiffnessOfAModelThatLeavesSomethingOutHasACaveat) {
   for (const bool whole : {true, false}) {
     const Copy copy(whole ? "whole" : "left_out");
-    std::string model = ReadShipped("models/scara_robot/elastic.yaml");
-    Replace("parameters_from: model.yaml",
-            "parameters_from: \"" + SourcePath("/models/scara_robot/model.yaml") + "\"", &model);
-    if (!whole) model += "\nleft_out: [a spring acts on the joint]\n";
-    copy.Model(model);
-    const std::string scenario =
-        copy.Scenario(ReadShipped("scenarios/scara_robot/stiffness.yaml"), "scara_robot");
-    RunOptions options;
-    options.pictures = false;
-    const RunOutcome outcome = RunScenario(scenario, options);
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.diagnostics.Text();
+    const RunOutcome outcome = StiffnessOf(
+        copy, ElasticModel() + (whole ? "" : "\nleft_out: [a spring acts on the joint]\n"));
     ASSERT_TRUE(outcome.other);
     const auto json = nlohmann::json::parse(outcome.other->Json());
     ASSERT_EQ(json["caveats"].size(), whole ? 0u : 1u) << json["caveats"];

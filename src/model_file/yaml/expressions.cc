@@ -14,6 +14,7 @@
 #include <unordered_map>
 
 #include "base/diagnostics.h"
+#include "base/text.h"
 #include "model_file/yaml/yaml_reader.h"
 
 namespace mbv {
@@ -203,6 +204,8 @@ struct Decision {
   };
   Kind kind = Kind::kTruth;
   std::vector<std::string> texts;
+
+  bool operator==(const Decision&) const = default;
 };
 
 // An expression that muParser takes, with a name in place of what each decision gives.
@@ -276,17 +279,11 @@ class BranchedText {
         out.resize(out.rfind(name));
         out += call;
       } else {
-        out += "(" + Joined(arguments, ",", [this](const auto& a) { return Rewritten(a); }) + ")";
+        for (std::string& argument : arguments) argument = Rewritten(argument);
+        out += "(" + Joined(arguments) + ")";
       }
       name.clear();
     }
-    return out;
-  }
-
-  static std::string Joined(const std::vector<std::string>& parts, const char* between,
-                            const std::function<std::string(const std::string&)>& as) {
-    std::string out;
-    for (const std::string& part : parts) out += (&part == parts.data() ? "" : between) + as(part);
     return out;
   }
 
@@ -308,9 +305,13 @@ class BranchedText {
     return out + "(" + Rewritten(arguments.back()) + "))";
   }
 
+  // What a named part decides stands wherever that is used: it is decided once.
   std::string Decide(Decision::Kind kind, const std::vector<std::string>& texts) {
-    decisions_.push_back({kind, texts});
-    return NameOf(decisions_.size() - 1);
+    const Decision decision{kind, texts};
+    const auto at =
+        static_cast<size_t>(std::ranges::find(decisions_, decision) - decisions_.begin());
+    if (at == decisions_.size()) decisions_.push_back(decision);
+    return NameOf(at);
   }
 
   const std::function<bool(const std::string&)> varies_;

@@ -370,7 +370,7 @@ std::vector<int> StickSlip::Pieces() const {
     pieces.push_back(PieceOf(s_.engine.mechanism->elements[e], at.position, at.rate));
   }
   if (!branching_.empty()) {
-    const std::vector<int>& branches = s_.loads.branches();
+    const std::vector<int> branches = s_.loads.Branches();
     pieces.insert(pieces.end(), branches.begin(), branches.end());
   }
   return pieces;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "math/spatial.h"
 #include "mechanism/motion.h"
@@ -99,7 +100,7 @@ FollowingLoads::FollowingLoads(const EngineModel& engine, const Motion& motion)
     : engine_(engine),
       motion_(motion),
       branching_(BranchingFunctions(*engine.mechanism, motion)),
-      branches_(branching_.size(), 0) {
+      evaluated_(branching_.size()) {
   const auto add = [&](const StateFunction& function, std::vector<Angle>* angles) {
     for (const StateFunction::Input& input : function.inputs) {
       angles->push_back({.value = StartAngle(*engine.mechanism, motion, input.coordinate)});
@@ -138,17 +139,30 @@ double FollowingLoads::FunctionAt(const StateFunction& function, const std::stri
     inputs.push_back(Read(input, d, t_s, angle++));
   }
   int branch = kAnyBranch;
+  Evaluated* last = nullptr;
   if (function.branch) {
     const auto of = std::ranges::find(branching_, &function, &BranchingFunction::function);
     const auto at = static_cast<size_t>(of - branching_.begin());
-    branches_[at] = function.branch(t_s, inputs);
+    last = &evaluated_[at];
     if (!fixed_.empty()) branch = fixed_[at];
   }
-  const double value = function.At(t_s, inputs, branch);
-  if (std::isfinite(value)) return value;
-  // Left out: the run ends, and MuJoCo gets numbers until then.
-  if (trouble_.ok()) trouble_ = HasNoValue(*engine_.mechanism, path, function, t_s, inputs, value);
-  return 0.0;
+  double value = function.At(t_s, inputs, branch);
+  if (!std::isfinite(value)) {  // left out: the run ends, and MuJoCo gets numbers until then
+    if (trouble_.ok()) {
+      trouble_ = HasNoValue(*engine_.mechanism, path, function, t_s, inputs, value);
+    }
+    value = 0.0;
+  }
+  if (last != nullptr) *last = {t_s, std::move(inputs)};
+  return value;
+}
+
+std::vector<int> FollowingLoads::Branches() const {
+  std::vector<int> branches;
+  for (size_t k = 0; k < branching_.size(); ++k) {
+    branches.push_back(branching_[k].function->branch(evaluated_[k].time_s, evaluated_[k].inputs));
+  }
+  return branches;
 }
 
 Vec6 FollowingLoads::PartOf(size_t l, const mjData& d, double t_s) {

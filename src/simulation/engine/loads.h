@@ -25,7 +25,7 @@ class FollowingLoads {
   /// The first part that was not finite.
   [[nodiscard]] const RunSummary& trouble() const { return trouble_; }
   /// On which branch each of BranchingFunctions() was when it was evaluated last.
-  [[nodiscard]] const std::vector<int>& branches() const { return branches_; }
+  [[nodiscard]] std::vector<int> Branches() const;
   /// From here on they are taken by these branches; empty: by the ones that hold.
   void FixBranches(std::vector<int> branches) { fixed_ = std::move(branches); }
 
@@ -43,7 +43,12 @@ class FollowingLoads {
   const Motion& motion_;
   std::vector<std::vector<Angle>> angles_;  ///< per load and drive force: of all inputs
   const std::vector<BranchingFunction> branching_;
-  std::vector<int> branches_, fixed_;
+  struct Evaluated {
+    double time_s = 0.0;
+    std::vector<double> inputs = {};
+  };
+  std::vector<Evaluated> evaluated_;  ///< per branching_
+  std::vector<int> fixed_;
   RunSummary trouble_ = RunSummary::Done();
 };
 
@@ -80,8 +85,8 @@ class Loads {
   [[nodiscard]] bool follow() const;
   /// The first load that was not finite; then nothing evaluated since is.
   [[nodiscard]] const RunSummary& trouble() const { return following_.trouble(); }
-  /// FollowingLoads::branches() of what was evaluated last.
-  [[nodiscard]] const std::vector<int>& branches() const { return following_.branches(); }
+  /// FollowingLoads::Branches() of what was evaluated last.
+  [[nodiscard]] std::vector<int> Branches() const { return following_.Branches(); }
   void FixBranches(std::vector<int> branches) { following_.FixBranches(std::move(branches)); }
   [[nodiscard]] const std::vector<WorldLoad>& world() const { return world_; }
   [[nodiscard]] const std::vector<JointForce>& joint_forces() const { return joint_forces_; }
