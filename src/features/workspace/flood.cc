@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <thread>
 #include <unordered_map>
@@ -26,6 +27,7 @@ constexpr double kCutShare = 1e-4;  // of an edge, to which a cut is found
 constexpr int kMostCuts = 30;
 constexpr double kStride = 0.02, kRoom = 1.15;  // [rad, characteristic lengths]; of a plan
 constexpr int kMostStrides = 10000;
+constexpr int kHalvings = 16;                            // of an edge, down to where branches cross
 constexpr double kNearlyLost = 1e-3, kNearlyFold = 0.5;  // margins, by those at home
 constexpr double kGibibyte = 1073741824.0, kMostCorners = 4e6;
 constexpr double kOverhead = 200.0;   // bytes of a corner beside its pose: key, node, allocations
@@ -43,13 +45,14 @@ struct LatticeHash {
 struct Corner {
   bool inside = false, closes = false;
   bool passes = false;  // the way goes on from here
+  bool across = false;  // type 2 lies on the way, which is inside again
   int bound = -1;
   SpacePose pose;  // where it closes
 };
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<Corner>& corner) {
   visit(corner.inside), visit(corner.closes), visit(corner.passes), visit(corner.bound);
-  visit(corner.pose);
+  visit(corner.across), visit(corner.pose);
 }
 
 struct Cut {
@@ -75,6 +78,32 @@ void OnThreads(size_t count, int threads, const PoseSpace& space, std::atomic<lo
   for (int t = 1; t < threads && static_cast<size_t>(t) < count; ++t) others.emplace_back(run);
   run();
   for (std::thread& other : others) other.join();
+}
+
+// Between two poses inside, where branches of type 2 cross, its margin may vanish twice, or touch
+// zero: the first share of the way at which it is found not to be positive. Halves, until twice
+// what a half's middle is off its chord is less than what is left there. NaN of what does not
+// close.
+std::optional<double> FirstGap(const std::function<double(double)>& margin, double a, double m_a,
+                               double b, double m_b, int halvings) {
+  const double middle = 0.5 * (a + b), m = margin(middle);
+  if (m < 0.0 || halvings == 0) return middle;
+  if (std::min({m_a, m, m_b}) > std::abs(m_a - 2.0 * m + m_b)) return std::nullopt;
+  if (!std::isfinite(m)) return std::nullopt;
+  const auto first = FirstGap(margin, a, m_a, middle, m, halvings - 1);
+  return first ? first : FirstGap(margin, middle, m, b, m_b, halvings - 1);
+}
+// The same from a pose to what Close() found for the coordinates `target`.
+std::optional<double> FirstGap(const PoseSpace& space, const PlacedPose& from, const VecX& target,
+                               const PlacedPose& to) {
+  const int type2 = space.type2_bound();
+  if (type2 < 0) return std::nullopt;
+  const auto margin = [&](double share) {
+    PlacedPose at;
+    const VecX x = from.pose.at + share * (target - from.pose.at);
+    return space.Close(from, x, &at) ? at.pose.margin[type2] : kNan;
+  };
+  return FirstGap(margin, 0.0, from.pose.margin[type2], 1.0, to.pose.margin[type2], kHalvings);
 }
 
 // One tetrahedron, triangle or segment: corners with their values' signs and cuts.
@@ -196,6 +225,12 @@ class Flooder {
     const double least = at.pose.margin.minCoeff(&worst);
     const bool part = reach == Fibre::Reach::kPart;
     corner.inside = !part && least >= 0.0;
+    if (corner.inside && !fibre_.any() && from.pose.margin.minCoeff() >= 0.0 &&
+        FirstGap(space, from, space.Target(At(key)), at)) {
+      corner.inside = false;
+      corner.across = true;
+      worst = space.type2_bound();
+    }
     corner.passes = corner.inside || (space.settings().for_all && at_start >= 0.0);
     if (!corner.inside) {
       corner.bound = part && least >= 0.0 ? FoldBound(at.pose.margin) : static_cast<int>(worst);
@@ -309,47 +344,79 @@ class Flooder {
     return a;
   }
 
+  // The cell of a spacing in which one of a finer spacing lies.
+  [[nodiscard]] static Lattice Covering(Lattice cell, int spacing) {
+    for (int& i : cell) i = (i >= 0 ? i / spacing : -((-i + spacing - 1) / spacing)) * spacing;
+    return cell;
+  }
+  // Whether a cell of a level counts, by itself, by its parts, or by one that covers it.
+  [[nodiscard]] bool Counts(int level, const Lattice& cell) const {
+    for (int l = 0; l < level; ++l) {
+      if (cells_[static_cast<size_t>(l)].contains(Covering(cell, SpacingAt(l)))) return true;
+    }
+    const auto at = static_cast<size_t>(level);
+    return cells_[at].contains(cell) || refined_[at].contains(cell);
+  }
+  // A cell of a level that counts by itself: those that cover it are halved.
+  void Open(int level, const Lattice& cell) {
+    for (int l = 0; l < level; ++l) {
+      const auto at = static_cast<size_t>(l);
+      const Lattice wide = Covering(cell, SpacingAt(l));
+      if (cells_[at].erase(wide) == 0) continue;
+      refined_[at].insert(wide);
+      std::vector<Lattice> children;
+      ForEachCorner(
+          [&](const Lattice& offset) { children.push_back(Sum(wide, offset, SpacingAt(l + 1))); });
+      Complete(l + 1, children);
+      cells_[at + 1].insert(children.begin(), children.end());
+    }
+    cells_[static_cast<size_t>(level)].insert(cell);
+  }
+
   // Corners of cells that were not visited, from the nearest one inside of the same cell's parent.
   void Complete(int level, const std::vector<Lattice>& cells) {
     const int spacing = SpacingAt(level);
-    std::map<Lattice, Lattice> wanted;  // and from where
+    std::map<Lattice, std::vector<Lattice>> wanted;  // and from where, the nearest first
     for (const Lattice& cell : cells) {
       ForEachCorner([&](const Lattice& offset) {
         const Lattice key = Sum(cell, offset, spacing);
         if (corners_.contains(key) || wanted.contains(key)) return;
-        const Lattice* best = nullptr;
-        long least = 0;
-        Lattice candidate{};
-        // Corners of this cell, and of the one that it is a part of.
-        for (int wider = 1; wider <= 2 && best == nullptr; ++wider) {
-          const int s = spacing * wider;
-          Lattice base = cell;
-          if (wider == 2) {
-            for (int& i : base) i = (i >= 0 ? i / s : -((-i + s - 1) / s)) * s;
+        std::vector<std::pair<long, Lattice>> near;
+        const auto offer = [&](const Lattice& other) {
+          const auto at = corners_.find(other);
+          if (at == corners_.end() || !at->second.passes) return;
+          long distance = 0;
+          for (size_t c = 0; c < 3; ++c) {
+            const long d = other.at(c) - key.at(c);
+            distance += d * d;
           }
-          ForEachCorner([&](const Lattice& o) {
-            const Lattice other = Sum(base, o, s);
-            const auto at = corners_.find(other);
-            if (at == corners_.end() || !at->second.passes) return;
-            long distance = 0;
-            for (size_t c = 0; c < 3; ++c) {
-              const long d = other.at(c) - key.at(c);
-              distance += d * d;
-            }
-            if (best != nullptr && distance >= least) return;
-            candidate = other;
-            best = &candidate;
-            least = distance;
-          });
+          near.emplace_back(distance, other);
+        };
+        // Corners of this cell, and of the one that it is a part of.
+        for (int wider = 1; wider <= 2 && near.empty(); ++wider) {
+          const int s = spacing * wider;
+          const Lattice base = wider == 1 ? cell : Covering(cell, s);
+          ForEachCorner([&](const Lattice& o) { offer(Sum(base, o, s)); });
         }
-        if (best != nullptr) wanted.emplace(key, candidate);
+        if (near.empty() && spacing > 1) {  // or those within, beyond a neck
+          ForEachCorner([&](const Lattice& o) { offer(Sum(cell, o, spacing / 2)); }, 2);
+        }
+        if (near.empty()) return;
+        std::ranges::stable_sort(near, {}, &std::pair<long, Lattice>::first);
+        auto& from = wanted[key];
+        for (const auto& [distance, other] : near) from.push_back(other);
       });
     }
-    const std::vector<std::pair<Lattice, Lattice>> list(wanted.begin(), wanted.end());
+    const std::vector<std::pair<Lattice, std::vector<Lattice>>> list(wanted.begin(), wanted.end());
     auto found = ForAll<Corner>(list.size(), [&](size_t i, PoseSpace& own) {
-      PlacedPose from;
-      const bool placed = own.Place(corners_.find(list[i].second)->second.pose, &from);
-      return placed ? Visit(own, from, list[i].first) : Corner();
+      const auto& [key, nearest] = list[i];
+      Corner corner;
+      for (const Lattice& other : nearest) {
+        PlacedPose from;
+        if (own.Place(corners_.find(other)->second.pose, &from)) corner = Visit(own, from, key);
+        if (!corner.across) break;
+      }
+      return corner;
     });
     for (size_t i = 0; i < list.size(); ++i) Take(list[i].first, std::move(found[i]));
   }
@@ -400,14 +467,34 @@ class Flooder {
                 other.at(c) += wide * (offset.at(c) - 1);
               }
               if (refined.contains(other) || more.contains(other)) return;
-              if (StateOf(other, wide, spacing) != 1) return;
-              cells_[static_cast<size_t>(level - 1)].insert(other);
-              more.insert(other);
+              if (StateOf(other, wide, spacing) == 1) more.insert(other);
             },
             2);
       }
-      Complete(level - 1, {more.begin(), more.end()});
-      todo.assign(more.begin(), more.end());
+      for (const Lattice& cell : more) Open(level - 1, cell);
+      // And what lies beyond a neck of the set, through which only finer corners lead.
+      std::vector<Lattice> fresh(more.begin(), more.end());
+      while (!fresh.empty() && Fits()) {
+        Complete(level - 1, fresh);
+        std::set<Lattice> next;
+        for (const Lattice& cell : fresh) {
+          ForEachCorner([&](const Lattice& offset) {
+            const Lattice key = Sum(cell, offset, wide);
+            if (!IsIn(key)) return;
+            ForEachCorner([&](const Lattice& back) {
+              const Lattice other = Sum(key, back, -wide);
+              if (!Counts(level - 1, other) && !refined.contains(other)) next.insert(other);
+            });
+          });
+        }
+        for (const Lattice& cell : next) cells_[static_cast<size_t>(level - 1)].insert(cell);
+        more.insert(next.begin(), next.end());
+        fresh.assign(next.begin(), next.end());
+      }
+      todo.clear();
+      for (const Lattice& cell : more) {
+        if (StateOf(cell, wide, spacing) == 1) todo.push_back(cell);
+      }
     }
     auto& finer = cells_[static_cast<size_t>(level)];
     for (const Lattice& cell : refined) {
@@ -488,11 +575,15 @@ class Flooder {
                           : space.CloseNear(from, space.Target(x), &at);
     };
     if (Close(space, from, b, &at, &unused) == Fibre::Reach::kWhole) {
-      if (at.pose.margin.minCoeff() >= 0.0) {  // outside by another sheet
-        cut.share = 1.0;
-        return cut;
-      }
       margin_high = at.pose.margin;
+      if (margin_high.minCoeff() >= 0.0) {
+        const auto gap = fibre_.any() ? std::nullopt : FirstGap(space, from, space.Target(b), at);
+        cut.share = gap.value_or(1.0);  // outside by another sheet
+        if (gap) cut.bound = space.type2_bound();
+        if (!gap || !close(*gap) || at.pose.margin.minCoeff() >= 0.0) return cut;
+        high = *gap;
+        margin_high = at.pose.margin;
+      }
     }
     // A fold is approached in steps that close, towards where the square of its margin would
     // vanish, which is linear there.
@@ -686,13 +777,17 @@ class Flooder {
     for (int c = 0; c < k_; ++c) size *= set_.step.at(static_cast<size_t>(c));
     return size;
   }
-  // Size of the finest cells that several bounds cut.
+  // Size of the finest cells that several bounds cut, or branches of one.
   [[nodiscard]] double CornerCells() const {
     if (k_ == 1) return 0.0;
     size_t cells = 0;
     for (const Lattice& cell : CutCells(settings_.halvings)) {
       int bound = -2;
       bool several = false;
+      ForEachCorner([&](const Lattice& offset) {
+        const auto at = corners_.find(Sum(cell, offset, 1));
+        several = several || (at != corners_.end() && at->second.across);
+      });
       ForEachSimplex(cell, 1, [&](const Simplex& simplex) {
         for (int i = 0; i <= k_; ++i) {
           for (int j = 0; j <= k_; ++j) {
@@ -768,7 +863,7 @@ FloodPlan PlanFlood(const PoseSpace& space, const PlacedPose& home, const FloodS
         const bool closes = fibre.any()
                                 ? fibre.At(space, at, target.head(k), &next, &at_start) != none
                                 : space.Close(at, target, &next);
-        if (!closes) break;
+        if (!closes || (!fibre.any() && FirstGap(space, at, target, next))) break;
         const bool all = fibre.any() && space.settings().for_all;
         if ((all ? at_start : next.pose.margin.minCoeff()) < 0.0) break;
         at = std::move(next);

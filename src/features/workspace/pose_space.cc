@@ -173,6 +173,7 @@ void PoseSpace::AddBounds() {
   bounds_.push_back({SetBound::Kind::kConstraint, "constraint singularity", "", false, 0.0, -1});
   bounds_.push_back({SetBound::Kind::kType1, "type-1 singularity", "", false, 0.0, -1});
   if (driven_.size() == settings_.coordinates.size() && !settings_.cross_type2) {
+    type2_bound_ = static_cast<int>(bounds_.size());
     bounds_.push_back({SetBound::Kind::kType2, "type-2 singularity", "", false, 0.0, -1});
   }
 }

@@ -143,12 +143,16 @@ class PoseSpace {
   [[nodiscard]] int over() const { return settings_.over; }
   [[nodiscard]] const SpaceSettings& settings() const { return settings_; }
   [[nodiscard]] const std::vector<SetBound>& bounds() const { return bounds_; }
+  /// The bound of type 2, or −1.
+  [[nodiscard]] int type2_bound() const { return type2_bound_; }
   [[nodiscard]] const Mechanism& mechanism() const { return *mechanism_; }
   [[nodiscard]] const ShapePairs* shapes() const { return shapes_.get(); }
   [[nodiscard]] double length() const { return length_; }
   [[nodiscard]] bool has_idle_spins() const { return !spins_.empty(); }
   /// A length that a free coordinate's unit counts as: the characteristic one, or 1 rad.
   [[nodiscard]] double UnitOf(int coordinate) const;
+  /// Of a product of rows' sizes as determinants of type 2 count.
+  [[nodiscard]] double MarginOfTypeTwo(double size) const { return size / std::abs(home_type2_); }
   /// Searches for a pose so far, by this object.
   [[nodiscard]] long closings() const { return closings_; }
 
@@ -219,6 +223,7 @@ class PoseSpace {
   std::vector<Watched> watched_;
   std::shared_ptr<const ShapePairs> shapes_;  ///< null without a clearance
   std::vector<SetBound> bounds_;
+  int type2_bound_ = -1;
   std::vector<Coordinate> driven_;  ///< drives, prescribed joints
   int rank_ = 0;                    ///< of A at home
   double home_type1_ = 1.0, home_type2_ = 1.0, home_least_ = 1.0;

@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <boost/math/tools/minima.hpp>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -22,13 +23,20 @@ namespace {
 using Vec2 = Eigen::Vector2d;
 using std::numbers::pi;
 
-constexpr int kDegree = 8;           // of the polynomials along a step
-constexpr double kTail = 1e-9;       // last coefficients by the size of the set
-constexpr double kOnBound = 1e-2;    // of the margins before and behind it
-constexpr double kRoundings = 10.0;  // by which a margin at a crossing is off, from what it is
-constexpr double kBeyond = 1e-9;     // margins below −this are outside
-constexpr double kDip = 1e-8;        // the same between two nodes, by their polynomial
-constexpr double kBeside = 1e-6;     // of a difference quotient beside a curve
+constexpr int kDegree = 8;               // of the polynomials along a step
+constexpr double kTail = 1e-9;           // last coefficients by the size of the set
+constexpr double kOnBound = 1e-2;        // of the margins before and behind it
+constexpr double kRoundings = 10.0;      // by which a margin at a crossing is off, from what it is
+constexpr double kBeyond = 1e-9;         // margins below −this are outside
+constexpr double kDip = 1e-8;            // the same between two nodes, by their polynomial
+constexpr double kBeside = 1e-6;         // of a difference quotient beside a curve
+constexpr double kNearlyStraight = 4.0;  // least value on a way by its second difference
+constexpr double kSmooth = 0.02;         // of a polynomial on a way, its last coefficient
+constexpr double kLow = 0.5;         // of a node's value, the least one about it that is looked at
+constexpr double kTouch = 1e-10;     // of its values, where it is zero
+constexpr double kFlat = 1e-4;       // of a margin's rates where it vanishes twice, the lesser one
+constexpr double kOffValley = 1e-6;  // of its slope's rate, the slope there
+constexpr int kMostHalvings = 10;    // of such a way
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
 constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
@@ -123,13 +131,88 @@ const Chebyshev& Nodes() {
 struct Hit {
   PlacedPose at;
   int bound = -1;
+  VecX way;  // where a margin vanishes twice: the motion that came there; else empty
+
+  [[nodiscard]] bool twice() const { return way.size() > 0; }
 };
+
+// Where branches of type 2 cross, parts of a set touch in one pose, and near it the determinant has
+// roots close together. The first place between a and b, by polynomials of degree 4 in Chebyshev
+// nodes on a way that they follow, where it is negative, or least and zero. NaN of what does not
+// close.
+constexpr int kOfWay = 4, kOnWay = 32;
+template <typename Margin>
+std::optional<double> FirstGap(const Margin& margin, double a, double m_a, double b, double m_b,
+                               int halvings = kMostHalvings) {
+  Eigen::Matrix<double, kOfWay + 1, 1> value, c;
+  value[0] = m_a;
+  value[kOfWay] = m_b;
+  const double middle = 0.5 * (a + b), m = value[kOfWay / 2] = margin(middle);
+  if (std::min({m_a, m, m_b}) > kNearlyStraight * std::abs(m_a - 2.0 * m + m_b)) {
+    return std::nullopt;
+  }
+  for (const int k : {1, 3}) {
+    value[k] = margin(a + (b - a) * 0.5 * (1.0 - std::cos(pi * k / kOfWay)));
+  }
+  for (int j = 0; j <= kOfWay; ++j) {
+    c[j] = 0.0;
+    for (int k = 0; k <= kOfWay; ++k) {
+      const double weight = k == 0 || k == kOfWay ? 0.5 : 1.0;
+      c[j] += weight * value[k] * std::cos(pi * j * (kOfWay - k) / kOfWay) *
+              (j == 0 || j == kOfWay ? 1.0 : 2.0) / kOfWay;
+    }
+  }
+  const double off = std::abs(c[kOfWay]);
+  if (!value.allFinite() || off > kSmooth * value.cwiseAbs().maxCoeff()) {
+    if (halvings == 0) return a;
+    const auto first = FirstGap(margin, a, m_a, middle, m, halvings - 1);
+    return first ? first : FirstGap(margin, middle, m, b, m_b, halvings - 1);
+  }
+  const double zero = kTouch * value.cwiseAbs().maxCoeff();
+  const auto place = [&](int i) { return a + (b - a) * i / kOnWay; };
+  Eigen::Matrix<double, kOnWay + 1, 1> on;
+  for (int i = 0; i <= kOnWay; ++i) {
+    const double x = 2.0 * i / kOnWay - 1.0;
+    on[i] = c[0] + x * c[1] + (2 * x * x - 1) * c[2] + x * (4 * x * x - 3) * c[3] +
+            (8 * x * x * (x * x - 1) + 1) * c[4];
+  }
+  for (int i = 1; i <= kOnWay; ++i) {
+    if (on[i] < -zero && margin(place(i)) < -zero) return place(i);
+    if (i == kOnWay || on[i] > on[i - 1] || on[i] > on[i + 1]) continue;
+    const double bend = on[i - 1] - 2.0 * on[i] + on[i + 1], slope = 0.5 * (on[i + 1] - on[i - 1]);
+    if (on[i] - (bend > 0.0 ? slope * slope / (2.0 * bend) : 0.0) > 2.0 * off + kLow * on[i]) {
+      continue;
+    }
+    const auto [s, least] = boost::math::tools::brent_find_minima(
+        [&](double at) {
+          const double value_there = margin(at);
+          return std::isfinite(value_there) ? value_there : std::numeric_limits<double>::max();
+        },
+        place(i - 1), place(i + 1), 30);
+    if (least <= zero) return s;
+  }
+  return std::nullopt;
+}
+
+// Where a margin is least near s, by Newton's method, to rounding: values alone tell it to 1e-8.
+template <typename Margin>
+double Bottom(const Margin& margin, double s) {
+  constexpr double step = 1e-3;
+  for (int i = 0; i < 3; ++i) {
+    const double a = margin(s - 2 * step), b = margin(s - step), m = margin(s),
+                 c = margin(s + step), d = margin(s + 2 * step);
+    const double move = step * (a - 8 * b + 8 * c - d) / (-a + 16 * b - 30 * m + 16 * c - d);
+    if (!(std::abs(move) < step)) break;
+    s -= move;
+  }
+  return s;
+}
 
 Vec2 Turned(const VecX& v) { return {v[1], -v[0]}; }
 
 class Tracer {
  public:
-  explicit Tracer(PoseSpace space) : space_(std::move(space)) {}
+  explicit Tracer(PoseSpace space) : space_(std::move(space)), type2_(space_.type2_bound()) {}
 
   [[nodiscard]] PoseSpace& space() { return space_; }
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
@@ -165,6 +248,7 @@ class Tracer {
           return std::nullopt;
         }
       }
+      if (auto hit = ExitByTypeTwo(at, along, h, next)) return hit;
       if (next.pose.margin.minCoeff() < 0.0) {
         auto hit = Exit(at, along, h, next);
         if (hit) return hit;
@@ -191,8 +275,9 @@ class Tracer {
   TracedLoop Trace(const Hit& start, int open = 0);
 
   // A way into the set from a pose on the boundary: tangent along the margin's slope.
-  [[nodiscard]] VecX Inwards(const PlacedPose& at, int bound) const {
-    VecX slope = space_.Slope(at, bound);
+  [[nodiscard]] VecX Inwards(const Hit& hit) const {
+    VecX slope =
+        hit.twice() ? VecX(-hit.at.N_free.transpose() * hit.way) : space_.Slope(hit.at, hit.bound);
     return slope.norm() > 0.0 ? VecX(slope.normalized()) : slope;
   }
   [[nodiscard]] bool Knows(const std::vector<TracedLoop>& loops, const Hit& hit) const;
@@ -239,23 +324,81 @@ class Tracer {
     return std::nullopt;
   }
 
+  // The same where type 2 is reached before.
+  std::optional<Hit> ExitByTypeTwo(const PlacedPose& at, const VecX& along, double h,
+                                   const PlacedPose& next) {
+    if (type2_ < 0) return std::nullopt;
+    PlacedPose there;
+    const auto margin = [&](double s) {
+      return space_.Step(at, s * along, &there) ? there.pose.margin[type2_] : kNan;
+    };
+    const auto gap = FirstGap(margin, 0.0, at.pose.margin[type2_], h, next.pose.margin[type2_]);
+    if (!gap || !space_.Step(at, *gap * along, &there)) return std::nullopt;
+    const double size = std::max(at.pose.margin[type2_], std::abs(next.pose.margin[type2_]));
+    const bool touches = std::abs(there.pose.margin[type2_]) <= kTouch * size;
+    there.pose.margin[type2_] = touches ? 0.0 : there.pose.margin[type2_];
+    if (there.pose.margin.minCoeff() < 0.0) return Exit(at, along, *gap, std::move(there));
+    if (!space_.Step(at, Bottom(margin, *gap) * along, &there)) return std::nullopt;
+    Vec2 slope;
+    const bool twice = VanishesTwice(there, &slope);
+    return Hit{std::move(there), type2_, twice ? VecX(at.N_free * along) : VecX()};
+  }
+
   // The pose on the bound's curve at τ along the tangent t.
   struct Curve {
     const PlacedPose* base;
     int bound;
     VecX t, n;           // n into the set
     double slope, rate;  // of the margin along n: slope + rate τ, about
+    bool twice;          // where the margin is least along n: its slope, by its rate along n
   };
+  // Of the margin, by five values: it is least within 1e-12 where this is zero.
+  bool SlopeAcross(const Curve& curve, double tau, double eta, double* slope) const {
+    constexpr double step = 1e-3;
+    std::array<double, 5> m{};
+    for (const int i : {-2, -1, 1, 2}) {
+      PlacedPose there;
+      if (!space_.Step(*curve.base, tau * curve.t + (eta + i * step) * curve.n, &there)) {
+        return false;
+      }
+      m.at(static_cast<size_t>(i + 2)) = there.pose.margin[curve.bound];
+    }
+    *slope = (m[0] - 8.0 * m[1] + 8.0 * m[3] - m[4]) / (12.0 * step);
+    return true;
+  }
+  // Whether a type-2 margin's slope vanishes with it.
+  bool VanishesTwice(const PlacedPose& at, Vec2* slope) const {
+    Eigen::Matrix2d H;
+    return Curvature(at, Vec2::Zero(), type2_, &H, slope) &&
+           slope->norm() < kOffValley * H.cwiseAbs().maxCoeff();
+  }
+  // Across a curve on which a margin vanishes twice: the direction, to the side of `inside`, and
+  // the rate of its slope. False where it does not: where two branches cross, for one.
+  bool Valley(const PlacedPose& at, int bound, const VecX& inside, VecX* n, double* rate) const {
+    Eigen::Matrix2d H;
+    Vec2 slope;
+    if (!Curvature(at, Vec2::Zero(), bound, &H, &slope)) return false;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(H);
+    *rate = axes.eigenvalues()[1];
+    *n = axes.eigenvectors().col(1);
+    if (n->dot(at.N_free.transpose() * inside) < 0.0) *n = -*n;
+    return std::abs(axes.eigenvalues()[0]) < kFlat * *rate && slope.norm() < kOffValley * *rate;
+  }
   bool OnCurve(const Curve& curve, double tau, double* eta, PlacedPose* to) const {
     if (HasRate(space_.bounds()[static_cast<size_t>(curve.bound)].kind)) {
       return space_.StepOn(curve.bound, *curve.base, tau, curve.t, to);
     }
     double x0 = *eta, f0 = 0.0, x1 = *eta;
     // Margins have the rounding of numbers about 1.
-    const double within = std::max(1e-13, 4 * kEps / (curve.slope + curve.rate * tau));
+    const double within =
+        curve.twice ? 1e-12 : std::max(1e-13, 4 * kEps / (curve.slope + curve.rate * tau));
     for (int i = 0; i < 12; ++i) {
+      double f1 = kNan;
+      if (curve.twice) {
+        if (!SlopeAcross(curve, tau, x1, &f1)) return false;
+      }
       if (!space_.Step(*curve.base, tau * curve.t + x1 * curve.n, to)) return false;
-      const double f1 = to->pose.margin[curve.bound];
+      if (!curve.twice) f1 = to->pose.margin[curve.bound];
       double step = -f1 / (curve.slope + curve.rate * tau);
       if (i > 0 && f1 != f0) step = -f1 * (x1 - x0) / (f1 - f0);
       if (!std::isfinite(step) || std::abs(step) > 0.5) return false;
@@ -287,6 +430,51 @@ class Tracer {
       if ((Nodes().dense * margin).minCoeff() < -kDip) return true;
     }
     return false;
+  }
+  // Where on a step along another bound's curve type 2 is touched, and whether it vanishes twice
+  // there. A curve that is touched from the set's side is passed by.
+  struct Touch {
+    double tau;
+    bool twice;
+  };
+  [[nodiscard]] std::optional<Touch> Touches(const std::array<PlacedPose, kDegree + 1>& at,
+                                             const Curve& curve, double h, double eta_end) const {
+    Eigen::VectorXd value(kDegree + 1);
+    for (size_t k = 0; k <= kDegree; ++k) {
+      value[static_cast<Eigen::Index>(k)] = at.at(k).pose.margin[type2_];
+    }
+    PlacedPose there;
+    const auto margin = [&](double tau) {
+      double guess = eta_end * std::pow(tau / h, 2);
+      return OnCurve(curve, tau, &guess, &there) ? there.pose.margin[type2_] : kNan;
+    };
+    const Eigen::VectorXd on = Nodes().dense * value;
+    const auto place = [&](Eigen::Index i) {
+      return 0.5 * h * (1.0 + std::cos(pi * static_cast<double>(i) / (2.0 * kDegree)));
+    };
+    for (Eigen::Index i = on.size() - 2; i > 0; --i) {
+      if (on[i] > on[i - 1] || on[i] > on[i + 1] || on[i] > kLow * std::max(on[i - 1], on[i + 1])) {
+        continue;
+      }
+      auto [tau, least] = boost::math::tools::brent_find_minima(
+          [&](double to) {
+            const double m = margin(to);
+            return std::isfinite(m) ? m : std::numeric_limits<double>::max();
+          },
+          place(i + 1), place(i - 1), 30);
+      if (std::abs(least) > kTouch * value.cwiseAbs().maxCoeff()) continue;
+      tau = Bottom(margin, tau);
+      Vec2 slope;
+      if (!std::isfinite(margin(tau))) continue;
+      const bool twice = VanishesTwice(there, &slope);
+      const VecX into = there.N_free.transpose() * (curve.base->N_free * curve.n);
+      if (twice || slope.dot(into) < 0.0) return Touch{tau, twice};
+    }
+    return std::nullopt;
+  }
+  // Of a margin that is a determinant, by the size of its rows.
+  [[nodiscard]] double Rounding(const PlacedPose& at, int bound) const {
+    return kEps * std::max(1.0, bound == type2_ ? space_.MarginOfTypeTwo(at.type2_size) : 0.0);
   }
   // Along the bound's curve, as `before` goes.
   [[nodiscard]] VecX DirectionAt(const PlacedPose& at, int bound, const VecX& before) const {
@@ -362,6 +550,7 @@ class Tracer {
   }
 
   PoseSpace space_;
+  int type2_;  // of its bounds
   std::string trouble_;
   bool unbounded_ = false;
 };
@@ -372,6 +561,12 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   Hit here = start;
   const Chebyshev& nodes = Nodes();
   VecX slope = space_.Slope(here.at, here.bound);
+  bool twice = false;  // the margin vanishes twice on this curve
+  double bend = kNan;  // rate of its slope across
+  if (here.twice()) {
+    twice = Valley(here.at, here.bound, -here.way, &slope, &bend);
+    if (!twice) slope.setZero();
+  }
   if (!(slope.norm() > 1e-12)) {
     trouble_ =
         "a bound's margin has no slope: " + space_.bounds()[static_cast<size_t>(here.bound)].name;
@@ -400,13 +595,14 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   double h = kFirstStep, size = 1e-3;
   double area = 0.0, error = 0.0;
   VecX n = slope.normalized();
-  double s0 = slope.norm(), rate = 0.0;
+  double s0 = twice ? bend : slope.norm(), rate = 0.0;
   loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
   enum class Event { kNone, kCorner, kCloses, kCrossing };
   int idle = 0;  // corners at the same point
   for (int step = 0; step < kMostArcSteps; ++step) {
-    const Curve curve{&here.at, here.bound, t, n, s0, rate};
-    const bool singular = IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
+    const Curve curve{&here.at, here.bound, t, n, s0, rate, twice};
+    const bool singular =
+        !twice && IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
     std::array<PlacedPose, kDegree + 1> at;
     at[0] = here.at;
     std::array<double, kDegree + 1> eta{};
@@ -414,6 +610,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
     Eigen::Matrix2d H;
     Event event = Event::kNone;
     int corner = -1;
+    bool touches = false;                                       // where a margin vanishes twice
+    double flattest = std::numeric_limits<double>::infinity();  // slope of the margin along n
     bool failed = false;
     const char* why = "no pose is near";
     // First to find what ends the step, then to its end.
@@ -449,7 +647,9 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
           corner = static_cast<int>(j);
           event = Event::kCorner;
         }
-        if (singular && Across(curve, tau, e, at.at(k)) < 0.0) {
+        const double steep = singular ? Across(curve, tau, e, at.at(k)) : kNan;
+        if (steep > 0.0) flattest = std::min(flattest, steep);
+        if (steep < 0.0) {
           // Another branch of the same singularity crosses.
           double s = tau;
           if (!Crossing(curve, &s, e, &crossing, &H)) {
@@ -486,6 +686,19 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
           break;
         }
       }
+      if (!failed && type2_ >= 0 && here.bound != type2_) {
+        const bool whole = attempt > 0 || event == Event::kNone;
+        const auto touch = whole ? Touches(at, curve, h, eta.back()) : std::nullopt;
+        if (touch && attempt == 0) {
+          end = touch->tau;
+          event = Event::kCorner;
+          corner = type2_;
+          touches = touch->twice;
+        } else if (touch && touch->tau < (1.0 - kBeside) * h) {
+          failed = true;
+          why = "type 2 is touched";
+        }
+      }
       if (failed || event == Event::kNone) break;
       if (attempt == 0) h = end;
       if (h < 1e-13) break;
@@ -499,9 +712,10 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       const Vec2 tail =
           (x * nodes.last.transpose()).cwiseAbs() + (x * nodes.one_before.transpose()).cwiseAbs();
       // Near a crossing, where its slope vanishes, the margin's rounding moves the curve.
-      const double blur = s0 > 0.0 ? 0.0
-                                   : kRoundings * std::abs(here.at.pose.margin[here.bound]) /
-                                         (rate * h * nodes.node[1]);
+      const double blur =
+          s0 > 0.0
+              ? (singular ? kRoundings * Rounding(at[0], here.bound) / flattest : 0.0)
+              : kRoundings * std::abs(here.at.pose.margin[here.bound]) / (rate * h * nodes.node[1]);
       failed = tail.maxCoeff() > kTail * size + blur && h > kLeastStep;
       if (failed) why = "it curves too much";
       if (!failed && Dips(at, here.bound)) {
@@ -537,7 +751,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
                              here.at.pose.at[1]);
       return loop;
     }
-    const VecX carried = here.at.N_free * t;
+    const VecX carried = here.at.N_free * t, across = here.at.N_free * n;
     VecX along = carried;  // at the last node before a crossing
     if (event == Event::kCrossing && h >= 1e-13) {
       const PlacedPose& last = at[kDegree - 1];
@@ -557,18 +771,37 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       continue;
     }
     if (event == Event::kCorner) {
-      const VecX old = space_.Slope(here.at, here.bound);
+      const VecX old =
+          twice ? VecX(here.at.N_free.transpose() * across) : space_.Slope(here.at, here.bound);
       here.bound = corner;
-      t = Turned(space_.Slope(here.at, corner).normalized());
+      twice = touches;
+      slope = space_.Slope(here.at, corner);
+      if (twice && !Valley(here.at, corner, -carried, &slope, &bend)) {
+        trouble_ = fmt::format("branches of {} cross at {:.6g}, {:.6g} on another bound",
+                               space_.bounds()[static_cast<size_t>(corner)].name,
+                               here.at.pose.at[0], here.at.pose.at[1]);
+        return loop;
+      }
+      t = Turned(slope.normalized());
       if (t.dot(old) < 0.0) t = -t;
       loop.arcs.push_back({corner, {here.at.pose.at.head<2>()}});
       h = kFirstStep;
+    } else if (twice) {
+      if (!Valley(here.at, here.bound, across, &slope, &bend)) {
+        trouble_ = fmt::format("branches of {} part at {:.6g}, {:.6g}",
+                               space_.bounds()[static_cast<size_t>(here.bound)].name,
+                               here.at.pose.at[0], here.at.pose.at[1]);
+        return loop;
+      }
+      t = Turned(slope);
+      if ((here.at.N_free * t).dot(carried) < 0.0) t = -t;
+      h = std::min(1.6 * h, kLargestStep);
     } else {
       t = DirectionAt(here.at, here.bound, carried);
       h = std::min(1.6 * h, kLargestStep);
     }
-    slope = space_.Slope(here.at, here.bound);
-    s0 = slope.norm();
+    if (!twice) slope = space_.Slope(here.at, here.bound);
+    s0 = twice ? bend : slope.norm();
     n = slope.normalized();
     if (!(s0 > 1e-12)) break;
   }
@@ -722,7 +955,7 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
   // Chords from points of each loop, found by rays from its first one.
   for (size_t c = 0; c < chords.size(); ++c) {
     const Hit from = chords[c];
-    const VecX in = Inwards(from.at, from.bound);
+    const VecX in = Inwards(from);
     PlacedPose near;
     double first = 1e-3;
     while (first > 1e-9 &&
@@ -933,6 +1166,20 @@ class SolidTracer {
     return wider;
   }
 
+  // To a pose of another section, not across type 2 by way of a pose where its branches cross.
+  [[nodiscard]] static bool Rises(const PoseSpace& flat, const PlacedPose& from, const VecX& target,
+                                  PlacedPose* to) {
+    if (!flat.Close(from, target, to) || !(to->pose.margin.minCoeff() > 0.0)) return false;
+    const int type2 = flat.type2_bound();
+    if (type2 < 0) return true;
+    const auto margin = [&](double s) {
+      PlacedPose there;
+      const VecX at = from.pose.at + s * (target - from.pose.at);
+      return flat.Close(from, at, &there) ? there.pose.margin[type2] : kNan;
+    };
+    return !FirstGap(margin, 0.0, from.pose.margin[type2], 1.0, to->pose.margin[type2]);
+  }
+
   // Poses of the nearest sections on both sides, carried over to a height.
   [[nodiscard]] std::vector<PlacedPose> SeedsAt(double height, const PoseSpace& flat) const {
     std::vector<PlacedPose> seeds;
@@ -941,8 +1188,7 @@ class SolidTracer {
         PlacedPose from, to;
         VecX target = pose.at;
         target[2] = height;
-        if (flat.Place(pose, &from) && flat.Close(from, target, &to) &&
-            to.pose.margin.minCoeff() > 0.0) {
+        if (flat.Place(pose, &from) && Rises(flat, from, target, &to)) {
           seeds.push_back(std::move(to));
         }
       }
@@ -1039,8 +1285,8 @@ class SolidTracer {
       PlacedPose from, to;
       VecX target = pose.at;
       target[2] = section.height;
-      if (tracer.space().Place(pose, &from) && tracer.space().Close(from, target, &to) &&
-          to.pose.margin.minCoeff() > 0.0 && !IsInside(section.loops, to.pose.at.head<2>())) {
+      if (tracer.space().Place(pose, &from) && Rises(tracer.space(), from, target, &to) &&
+          !IsInside(section.loops, to.pose.at.head<2>())) {
         seeds.push_back(std::move(to));
       }
     }

@@ -553,17 +553,111 @@ TEST(ReachableSet, ASectionOfTheScaraRobotIsThatOfItsClosedForm) {
 
 // On the axes of symmetry of this platform two branches of type 2 cross at any height, and near
 // home many are close: margins are a thousand times as large as at home, the set a hundredth of the
-// mechanism.
+// mechanism. Parts touch where branches cross; at z = 0.905 a neck of 1e-4 m joins two.
 TEST(ReachableSet, SectionsWithManyTypeTwoCurvesAreFollowed) {
+  struct Section {
+    const char* height;
+    int resolution;
+    double area;  // within the zeros of the closed form's determinant about home
+  };
   const Mechanism platform = ShippedModel("stabilizing_platform");
-  for (const char* height : {"z=0.905", "z=0.911688"}) {
-    SetArguments arguments = Over({"x", "y"}, 60);
-    arguments.at = {height};
+  for (const Section& section :
+       {Section{"z=0.905", 240, kNan}, Section{"z=0.9075", 120, kNan},
+        Section{"z=0.911688", 60, 0.00058414831}, Section{"z=0.93", 60, 0.00246316556}}) {
+    SCOPED_TRACE(section.height);
+    SetArguments arguments = Over({"x", "y"}, section.resolution);
+    arguments.at = {section.height};
     const Answer answer = Ask(platform, arguments);
-    ASSERT_TRUE(answer.set.summary.ok()) << height << " " << answer.set.verdict;
-    EXPECT_TRUE(answer.set.agree) << height << " " << answer.set.verdict;
-    EXPECT_LT(answer.set.traced.error, 1e-8 * answer.set.traced.measure);
+    ASSERT_TRUE(answer.set.summary.ok()) << answer.set.verdict;
+    EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
+    EXPECT_LT(answer.set.traced.error, 1e-7 * answer.set.traced.measure);
+    if (std::isfinite(section.area)) {
+      EXPECT_NEAR(answer.set.traced.measure, section.area, 3e-8 * section.area);
+    }
   }
+}
+
+// This robot's drives lose their hold twice where its links lie flat, so that the determinant keeps
+// its sign: the set ends there all the same, and what lies below is its image.
+TEST(ReachableSet, ASetEndsWhereTheDeterminantVanishesTwice) {
+  const Mechanism robot = ShippedModel("cabin_robot");
+  const Answer half = Ask(robot, Over({"x", "y"}, 60));
+  SetArguments across = Over({"x", "y"}, 60);
+  across.cross_singularities = true;
+  const Answer whole = Ask(robot, across);
+  ASSERT_TRUE(whole.set.summary.ok()) << whole.set.verdict;
+  ExpectMeasure(half, 0.5 * whole.set.traced.measure, 1e-9);
+}
+
+// Two drives on lengths lose their hold where they stand across: on the lines u = 0 and v = 0,
+// which cross. Beyond, the determinant has the sign of home again, but no way leads there.
+Mechanism CrossingGantry(const Vec3& axis_u, const Vec3& axis_v, double u, double v) {
+  return FromText(fmt::format(R"(
+name: crossing
+bodies:
+  bridge: {{mass: 1, inertia: [1, 1, 1], frames: {{foot: [0, 0, -0.2]}}}}
+  tool: {{mass: 1, inertia: [1, 1, 1]}}
+world: {{frames: {{floor: [0, 0, -0.2]}}}}
+joints:
+  u: {{kind: prismatic, parent: world, child: bridge, axis: [{}, {}, 0], guess: {}, range: [-0.3, 0.2]}}
+  v: {{kind: prismatic, parent: bridge, child: tool, axis: [{}, {}, 0], guess: {}, range: [-0.1, 0.15]}}
+drives:
+  one: {{kind: distance, from: world.floor, to: bridge}}
+  two: {{kind: distance, from: bridge.foot, to: tool}}
+outputs: {{tool: tool}}
+)",
+                              axis_u.x(), axis_u.y(), u, axis_v.x(), axis_v.y(), v));
+}
+
+TEST(ReachableSet, PartsThatTouchInASingularPoseAreApart) {
+  struct Start {
+    double u, v, area;
+  };
+  for (const Start& start :
+       {Start{0.1, 0.1, 0.2 * 0.15}, Start{-0.1, -0.05, 0.3 * 0.1}, Start{0.1, -0.05, 0.2 * 0.1},
+        Start{-0.15, 0.075, 0.3 * 0.15}, Start{1e-3, 1e-3, 0.2 * 0.15}}) {
+    const Mechanism mechanism = CrossingGantry({1, 0, 0}, {0.6, 0.8, 0}, start.u, start.v);
+    for (const int resolution : {23, 60}) {
+      SCOPED_TRACE(fmt::format("{} {} {}", start.u, start.v, resolution));
+      const Answer answer = Ask(mechanism, Over({"x", "y"}, resolution));
+      ExpectMeasure(answer, 0.8 * start.area, 1e-10);
+    }
+    SetArguments across = Over({"x", "y"}, 23);
+    across.cross_singularities = true;
+    ExpectMeasure(Ask(mechanism, across), 0.8 * 0.5 * 0.25, 1e-10);
+  }
+  // A path through the very pose.
+  const double half = std::sqrt(0.5);
+  const Answer path =
+      Ask(CrossingGantry({half, half, 0}, {half, -half, 0}, 0.08, 0.08), Over({"x"}, 60));
+  ASSERT_EQ(path.set.traced.ends.size(), 2u) << path.diagnostics.Text();
+  EXPECT_TRUE(path.set.agree) << path.set.verdict;
+  EXPECT_NEAR(path.set.traced.ends[0].first, 0.0, 1e-8);
+  EXPECT_NEAR(path.set.traced.ends[1].first, 0.3 * half, 1e-10);
+}
+
+// The line where branches cross leans: sections' parts touch elsewhere at each height.
+TEST(ReachableSet, AVolumeWhosePartsTouchAlongALineIsThatByHand) {
+  const Mechanism mechanism = FromText(R"(
+name: leaning
+bodies:
+  bridge: {mass: 1, inertia: [1, 1, 1], frames: {foot: [0, -0.15, 0.2]}}
+  lift: {mass: 1, inertia: [1, 1, 1]}
+  tool: {mass: 1, inertia: [1, 1, 1]}
+world: {frames: {floor: [0, 0, -0.2]}}
+joints:
+  u: {kind: prismatic, parent: world, child: bridge, axis: x, guess: 0.05, range: [-0.3, 0.2]}
+  w: {kind: prismatic, parent: bridge, child: lift, axis: z, guess: 0.02, range: [-0.1, 0.1]}
+  v: {kind: prismatic, parent: lift, child: tool, axis: [0, 0.8, 0.6], guess: 0.1, range: [-0.15, 0.15]}
+drives:
+  one: {kind: distance, from: world.floor, to: bridge}
+  lift: {kind: joint, joint: w}
+  two: {kind: distance, from: bridge.foot, to: tool}
+outputs: {tool: tool}
+)");
+  // u > 0 and v + 0.6 w > 0: half of the ranges of v and w, each by 0.8.
+  const Answer answer = Ask(mechanism, Over({"x", "y", "z"}, 24));
+  ExpectMeasure(answer, 0.2 * 0.8 * 0.5 * 0.3 * 0.2, 1e-9);
 }
 
 // A flood that takes one stroke to be longer disagrees with the boundary.
