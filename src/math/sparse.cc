@@ -308,8 +308,8 @@ std::vector<int> SparseRank::ColumnsAt(const std::vector<int>& places) const {
 
 std::vector<int> SparseRank::Independent() const { return ColumnsAt(kept_); }
 
-// With K the columns kept and D = K⁻¹ (those dropped), exchanging column i of K for dropped column j
-// multiplies the volume of K by |D_ij|: pivots of Gauss and Jordan on D.
+// With K the columns kept and D = K⁻¹ (those dropped), exchanging column i of K for dropped column
+// j multiplies the volume of K by |D_ij|: pivots of Gauss and Jordan on D.
 std::vector<int> SparseRank::FirmlyIndependent() const {
   const auto rank = static_cast<Eigen::Index>(kept_.size());
   const auto rest = static_cast<Eigen::Index>(dropped_.size());
