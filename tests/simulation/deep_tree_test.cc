@@ -81,7 +81,7 @@ Motion SwingEachDrive(const Mechanism& mechanism, double amplitude) {
   return motion;
 }
 
-DrivenMotion Commanded(const Motion& motion) {
+DrivenMotion FollowCommands(const Motion& motion) {
   return [&motion, command = CommandSample()](double t, DrivenSample* at) mutable {
     EvaluateMotion(motion, t, &command);
     at->position = command.position;
@@ -92,7 +92,7 @@ DrivenMotion Commanded(const Motion& motion) {
 }
 
 // Of all signals of a quantity that both have, relative to the largest.
-double WorstDifference(const Trace& a, const Trace& b, Quantity quantity) {
+double LargestDifference(const Trace& a, const Trace& b, Quantity quantity) {
   double worst = 0.0, largest = 0.0;
   for (size_t c = 0; c < b.channels.size(); ++c) {
     const int other = a.Find(b.channels[c].name);
@@ -161,16 +161,17 @@ TEST(DeepTrees, HaveTheForcesAndReactionsOfTheReference) {
     // The corrected engine's fourth order at 1 ms; the inverse mode has round-off alone.
     for (const auto& [mode, budget] :
          {std::pair(DriveMode::kInverse, 1e-9), std::pair(DriveMode::kPrescribedMotion, 1e-6)}) {
-      const SimulationRun run = Simulate(arm, motion, Commanded(motion), {.mode = mode});
+      const SimulationRun run = Simulate(arm, motion, FollowCommands(motion), {.mode = mode});
       ASSERT_TRUE(run.summary.ok()) << run.summary.message;
       for (const Quantity of : {Quantity::kForce, Quantity::kReaction, Quantity::kPosition}) {
-        EXPECT_LT(WorstDifference(run.trace, reference.trace, of), budget)
+        EXPECT_LT(LargestDifference(run.trace, reference.trace, of), budget)
             << with_elements << " " << static_cast<int>(of);
       }
       Mechanism perturbed = arm;
       perturbed.bodies.back().mass *= 1.0 + 100.0 * budget;
-      const SimulationRun wrong = Simulate(perturbed, motion, Commanded(motion), {.mode = mode});
-      EXPECT_GT(WorstDifference(wrong.trace, reference.trace, Quantity::kReaction), budget);
+      const SimulationRun wrong =
+          Simulate(perturbed, motion, FollowCommands(motion), {.mode = mode});
+      EXPECT_GT(LargestDifference(wrong.trace, reference.trace, Quantity::kReaction), budget);
     }
   }
 }
@@ -238,7 +239,7 @@ TEST(DeepTrees, MoveByForcesAsTheReferenceDoes) {
     return RunSummary::Done();
   };
   const auto worst = [&](const SimulationRun& run) {
-    return WorstDifference(run.trace, reference.trace, Quantity::kReaction);
+    return LargestDifference(run.trace, reference.trace, Quantity::kReaction);
   };
   const SimulationRun run = Simulate(chain, motion, none, options);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -261,14 +262,15 @@ TEST(DeepTrees, OfLoopsAgreeWithTheReference) {
     ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
     for (const auto& [mode, budget] :
          {std::pair(DriveMode::kInverse, 1e-8), std::pair(DriveMode::kPrescribedMotion, 1e-6)}) {
-      const SimulationRun run = Simulate(mechanism, motion, Commanded(motion), {.mode = mode});
+      const SimulationRun run = Simulate(mechanism, motion, FollowCommands(motion), {.mode = mode});
       ASSERT_TRUE(run.summary.ok()) << mechanism.name << ": " << run.summary.message;
-      EXPECT_LT(WorstDifference(run.trace, reference.trace, Quantity::kForce), budget)
+      EXPECT_LT(LargestDifference(run.trace, reference.trace, Quantity::kForce), budget)
           << mechanism.name;
       Mechanism perturbed = mechanism;
       for (Body& body : perturbed.bodies) body.mass *= 1.0 + 10.0 * budget;
-      const SimulationRun wrong = Simulate(perturbed, motion, Commanded(motion), {.mode = mode});
-      EXPECT_GT(WorstDifference(wrong.trace, reference.trace, Quantity::kForce), budget);
+      const SimulationRun wrong =
+          Simulate(perturbed, motion, FollowCommands(motion), {.mode = mode});
+      EXPECT_GT(LargestDifference(wrong.trace, reference.trace, Quantity::kForce), budget);
     }
   }
 }
