@@ -61,7 +61,7 @@ std::vector<Motion1> MotionsOf(const Joint& joint, const Mat3& R_WF, const Mat3&
   return {};
 }
 
-// A tree that nests at most so many bodies stays whole. A deeper one is cut where more than the
+// A tree that nests at most this many bodies stays whole. A deeper one is cut where more than the
 // second number have nested since the last cut: at a joint whose coordinate nothing uses, beyond
 // the third number at any. Of scissors, storeys and one long loop, whose costs cross there.
 constexpr int kWholeTree = 32, kCutFrom = 6, kCutAnywhere = 12;
