@@ -182,6 +182,9 @@ namespace {
 constexpr double kClear = 100.0;
 // Inverse iterations that estimate a singular value.
 constexpr int kIterations = 6;
+// Of columns that are combinations of those chosen; and as many coefficients are looked at.
+constexpr double kLargestCoefficient = 2.0;
+constexpr Eigen::Index kMostCoefficients = 25'000'000;
 
 double LongestColumn(const SparseRank::Matrix& A) {
   double longest = 0.0;
@@ -296,11 +299,38 @@ void SparseRank::Arrange() {
   clear_ = dropped_norm_ <= limit_ && (n == 0 || smallest_kept_ > kClear * limit_);
 }
 
-std::vector<int> SparseRank::Independent() const {
+std::vector<int> SparseRank::ColumnsAt(const std::vector<int>& places) const {
   std::vector<int> columns;
-  for (const int place : kept_) columns.push_back(order_[static_cast<size_t>(place)]);
+  for (const int place : places) columns.push_back(order_[static_cast<size_t>(place)]);
   std::sort(columns.begin(), columns.end());
   return columns;
+}
+
+std::vector<int> SparseRank::Independent() const { return ColumnsAt(kept_); }
+
+// With K the columns kept and D = K⁻¹ (those dropped), exchanging column i of K for dropped column
+// j multiplies the volume of K by |D_ij|: pivots of Gauss and Jordan on D.
+std::vector<int> SparseRank::FirmlyIndependent() const {
+  const auto rank = static_cast<Eigen::Index>(kept_.size());
+  const auto rest = static_cast<Eigen::Index>(dropped_.size());
+  if (rank == 0 || rest == 0 || rank > kMostCoefficients / rest) return Independent();
+  MatX D(R_dropped_);
+  R_kept_.triangularView<Eigen::Upper>().solveInPlace(D);
+  std::vector<int> chosen = kept_, others = dropped_;
+  for (Eigen::Index exchanges = 0; exchanges < rank + rest; ++exchanges) {
+    Eigen::Index i = 0, j = 0;
+    if (!(D.cwiseAbs().maxCoeff(&i, &j) > kLargestCoefficient)) break;
+    std::swap(chosen[static_cast<size_t>(i)], others[static_cast<size_t>(j)]);
+    const double pivot = D(i, j);
+    const VecX column = D.col(j), row = D.row(i).transpose() / pivot;
+    for (Eigen::Index k = 0; k < rest; ++k) {
+      if (row[k] != 0.0) D.col(k) -= row[k] * column;
+    }
+    D.row(i) = row.transpose();
+    D.col(j) = -column / pivot;
+    D(i, j) = 1.0 / pivot;
+  }
+  return ColumnsAt(chosen);
 }
 
 double SparseRank::SmallestSingularValue() const {

@@ -56,6 +56,11 @@ class SparseRank {
   [[nodiscard]] int rank() const { return static_cast<int>(kept_.size()); }
   /// The columns kept: they span what A's columns span. Increasing.
   [[nodiscard]] std::vector<int> Independent() const;
+  /// As many that span the same, chosen so that none of the others is a combination of them with a
+  /// coefficient above 2: their smallest singular value is close to the largest that a choice can
+  /// have [Gu and Eisenstat 1996], where that of the columns kept, which their order decides, may
+  /// be any. Increasing.
+  [[nodiscard]] std::vector<int> FirmlyIndependent() const;
   /// Singular values would say the same: with entries dropped of norm e, A has none between e and
   /// about the smallest of R.
   [[nodiscard]] bool clear() const { return clear_; }
@@ -74,6 +79,7 @@ class SparseRank {
   void Eliminate(Row row);
   void Order(const Matrix& A);
   void Arrange();
+  [[nodiscard]] std::vector<int> ColumnsAt(const std::vector<int>& places) const;
   [[nodiscard]] double SmallestSingularValue() const;
 
   double limit_ = 0.0;

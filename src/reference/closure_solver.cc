@@ -254,14 +254,33 @@ RunSummary ClosureSolver::SelectRows(bool of_forces) {
   return RunSummary::Done();
 }
 
+// The smallest singular value at home, with rows chosen there. It falls with the number of loops
+// that hang together, regular as they may be.
+double ClosureSolver::ControlAtHome() {
+  Trial home{states_, near_values_};
+  home.states.X_WB = mechanism_.X_WB_home;
+  EvaluateRows(&home);
+  std::vector<int> rows(static_cast<size_t>(joint_rows_));
+  std::iota(rows.begin(), rows.end(), 0);
+  SquareSystem system(mechanism_.bodies.size(), length_);
+  rows = system.IndependentRows(rows_, rows);
+  for (int k = joint_rows_; k < rows_.size(); ++k) rows.push_back(k);
+  const bool square = static_cast<int>(rows.size()) == system.size();
+  return square && system.Factor(rows_, rows, true) ? system.SmallestSingularValue(1) : 0.0;
+}
+
 bool ClosureSolver::SelectAnew() {
   if (static_cast<int>(selection_.size()) == rows_.size()) return false;
-  constexpr double kRegular = 1e-2;  // smallest singular value, clearly away from a singular pose
+  // Clearly away from a singular pose: by the smallest singular value, by its share of that at
+  // home, and by a multiple of what cannot be distinguished from zero.
+  constexpr double kRegular = 1e-2, kOfHome = 0.1, kClear = 10.0;
+  const double least = std::max(std::min(kRegular, kOfHome * ControlAtHome()),
+                                kClear * SingularValueLimit(Rounding(states_.X_WB) / length_));
   EvaluateHere();
   const std::vector<int> before = std::exchange(selection_, {});
   const int orientation = orientation_;
   if (SelectRows(false).ok() && selection_ != before && system_.Factor(rows_, selection_, true) &&
-      system_.SmallestSingularValue(1) > kRegular) {
+      system_.SmallestSingularValue(1) > least) {
     selection_is_new_ = false;
     orientation_ = system_.determinant_sign();
     return true;
@@ -419,6 +438,15 @@ RunSummary ClosureSolver::CheckPose() {
 RunSummary ClosureSolver::CheckHere() {
   const int worst = MeasureGaps();
   const double rounding = Rounding(states_.X_WB);
+  const double sigma = control_ = system_.SmallestSingularValue(1);
+  if (sigma < SingularValueLimit(rounding / length_)) {
+    RunSummary summary = Singular(fmt::format(
+        "the commands do not hold the mechanism at this pose (smallest singular value {:.1e})",
+        sigma));
+    summary.amount = sigma;
+    summary.unit = std::string("1");
+    return summary;
+  }
   if (gap_position_m_ > kOpen * length_ + rounding || gap_rotation_rad_ > kOpen) {
     RunSummary summary = Failed(
         Stop::kNoConvergence,
@@ -428,15 +456,6 @@ RunSummary ClosureSolver::CheckHere() {
     summary.where = OwnerOf(worst);
     summary.amount = rows_.value[worst];
     summary.unit = rows_.angular[worst] ? "rad" : "m";
-    return summary;
-  }
-  const double sigma = control_ = system_.SmallestSingularValue(1);
-  if (sigma < SingularValueLimit(rounding / length_)) {
-    RunSummary summary = Singular(fmt::format(
-        "the commands do not hold the mechanism at this pose (smallest singular value {:.1e})",
-        sigma));
-    summary.amount = sigma;
-    summary.unit = std::string("1");
     return summary;
   }
   return RunSummary::Done();

@@ -126,6 +126,7 @@ class ClosureSolver {
   /// Chooses among redundant rows anew at states(), where those chosen before may have become
   /// dependent although the mechanism is regular there. False if it is not.
   [[nodiscard]] bool SelectAnew();
+  [[nodiscard]] double ControlAtHome();
   /// Turns idle spins back by these angles.
   [[nodiscard]] RunSummary TurnBack(const std::vector<double>& turns);
   [[nodiscard]] RunSummary TakeLeastTurns();

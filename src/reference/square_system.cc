@@ -50,7 +50,7 @@ std::vector<int> IndependentColumns(const SparseLu::Matrix& columns) {
   std::vector<int> chosen;
   if (columns.rows() > kLargestDense) {
     const SparseRank qr(columns, kRankTolerance);
-    if (qr.clear()) return qr.Independent();
+    if (qr.clear()) return qr.FirmlyIndependent();
   }
   Eigen::ColPivHouseholderQR<MatX> qr{MatX(columns)};
   qr.setThreshold(kRankTolerance);

@@ -3,6 +3,7 @@
 #include <malloc.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -131,6 +132,33 @@ TEST(SparseRanks, FindRankAndNullSpaceAsSingularValuesDo) {
     EXPECT_LT(qr.smallest_kept(), 1.5 * svd.singularValues()[rank - 1]);
     EXPECT_GT(qr.smallest_kept(), 0.5 * svd.singularValues()[rank - 1]);
   }
+}
+
+// The first columns come in pairs that nearly are the same: they span all, others do it well.
+TEST(SparseRanks, ExchangeColumnsThatHardlySpanWhatOthersSpanWell) {
+  std::srand(5);
+  const MatX first = MatX::Random(20, 10), others = MatX::Random(20, 10);
+  MatX dense(20, 30);
+  dense << first, first + 1e-6 * MatX::Random(20, 10), others;
+  const SparseRank qr(dense.sparseView(), 1e-9);
+  ASSERT_EQ(qr.rank(), 20);
+  const std::vector<int> firm = qr.FirmlyIndependent();
+  const MatX kept = dense(Eigen::all, qr.Independent()), chosen = dense(Eigen::all, firm);
+  ASSERT_EQ(chosen.cols(), 20);
+  EXPECT_TRUE(std::ranges::is_sorted(firm));
+  const auto smallest = [](const MatX& A) {
+    return Eigen::BDCSVD<MatX>(A).singularValues().tail<1>()[0];
+  };
+  const auto largest_coefficient = [&](const MatX& A) {
+    return MatX(A.partialPivLu().solve(dense)).cwiseAbs().maxCoeff();
+  };
+  EXPECT_LT(largest_coefficient(chosen), 2.0 + 1e-8);
+  EXPECT_GT(smallest(chosen), 1e-2);
+  EXPECT_GT(largest_coefficient(kept), 1e3);
+  EXPECT_LT(smallest(kept), 1e-4);
+  // Where those kept do it well they stay.
+  const SparseRank good(MatX(MatX::Identity(8, 8)).sparseView(), 1e-9);
+  EXPECT_EQ(good.FirmlyIndependent(), good.Independent());
 }
 
 TEST(SparseRanks, AreNotClearNearTheTolerance) {

@@ -949,13 +949,14 @@ TEST(ForeignMjcf, RangesOfActuatorsHoldOfThemselves) {
 }
 
 // MuJoCo's reader takes 96 nested bodies; the limit is its own, not an estimate.
+// Free joints inside a tree are not cut.
 TEST(ForeignMjcf, AChainThatIsTooDeepForMujocoIsNamedSo) {
-  const auto chain = [](int bodies) {
+  const auto chain = [](int bodies, const std::string& kind) {
     std::string text = "name: chain\nbodies:\n", joints = "joints:\n";
     for (int i = 0; i < bodies; ++i) {
       text +=
           fmt::format("  b{}: {{mass: 1, inertia: [1, 1, 1], frames: {{end: [0.1, 0, 0]}}}}\n", i);
-      joints += fmt::format("  j{}: {{kind: revolute, parent: {}, child: b{}, axis: y}}\n", i,
+      joints += fmt::format("  j{}: {{kind: {}, parent: {}, child: b{}}}\n", i, kind,
                             i == 0 ? "world" : fmt::format("b{}.end", i - 1), i);
     }
     LoadResult loaded = LoadModelText(text + joints, "chain.yaml");
@@ -964,12 +965,13 @@ TEST(ForeignMjcf, AChainThatIsTooDeepForMujocoIsNamedSo) {
   };
   std::vector<std::string> warnings;
   const simulation::EngineSession session(&warnings);
-  for (const int bodies : {96, 97}) {
-    const Mechanism m = chain(bodies);
+  for (const auto& [bodies, kind] :
+       {std::pair(96, "free"), std::pair(97, "free"), std::pair(97, "revolute, axis: y")}) {
+    const Mechanism m = chain(bodies, kind);
     simulation::EngineModel engine;
     const std::string text = WriteMjcf(m, {.pictures = false});
     const RunSummary made = simulation::MakeEngineModel(m, text, &engine);
-    if (bodies == 96) {
+    if (bodies == 96 || kind != std::string("free")) {
       EXPECT_TRUE(made.ok()) << made.message;
     } else {
       EXPECT_EQ(made.stop, Stop::kUnsupported);

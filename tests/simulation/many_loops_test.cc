@@ -14,6 +14,7 @@
 #include "simulation/engine/simulation.h"
 #include "simulation/mjcf/plan.h"
 #include "tests/mechanisms/four_bar_chain.h"
+#include "tests/mechanisms/loop_shapes.h"
 
 namespace mbv {
 namespace {
@@ -293,6 +294,24 @@ TEST(ManyLoops, TheWitnessesAgreeOnChainsOfFourBars) {
         Simulate(perturbed, motion, Commanded(motion), {.mode = DriveMode::kInverse});
     EXPECT_GT(WorstDifference(wrong.trace, reference.trace), 1e-9) << loops;
   }
+}
+
+// Loops in a row hardly resist each other: without harder rows the forces that MuJoCo's softness
+// returns grow from step to step, whatever the step.
+TEST(ManyLoops, ThatStandOnEachOtherDoNotDiverge) {
+  const Mechanism lift = MechanismOf(ScissorLiftText(100, true));
+  Motion motion = SwingAllDrives(lift, 0.1);
+  motion.duration_s = 0.05;
+  const ReferenceRun reference = RunReference(lift, motion);
+  ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
+  const SimulationRun run = Simulate(lift, motion, Commanded(motion), {});
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  constexpr double kForces = 1e-6;  // the limit of a verdict
+  EXPECT_LT(WorstDifference(run.trace, reference.trace), kForces);
+  Mechanism perturbed = lift;
+  for (Body& body : perturbed.bodies) body.mass *= 1.0 + 2.0 * kForces;
+  const SimulationRun wrong = Simulate(perturbed, motion, Commanded(motion), {});
+  EXPECT_GT(WorstDifference(wrong.trace, reference.trace), kForces);
 }
 
 // The least forces by sparse factors are those of the dense pseudo-inverse.

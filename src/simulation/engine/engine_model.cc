@@ -245,6 +245,7 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   for (const mjcf::PlannedBody& body : engine->plan.bodies) {
     engine->body_id.push_back(IdOf(m, mjOBJ_BODY, body.name));
     for (const mjcf::PlannedJoint& joint : body.joints) {
+      if (joint.joint < 0) continue;
       engine->joint_ids[joint.joint].push_back(IdOf(m, mjOBJ_JOINT, joint.name));
     }
   }

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "simulation/engine/element_forces.h"
@@ -20,11 +21,21 @@ constexpr double kLightest = 1e-4;
 constexpr int kStartRepeats = 4;
 // Shares of the largest pivot of J, see the head of integrator.h.
 constexpr double kWeak = 0.01, kNear = 0.2;
+// Softness R of a constraint row relative to MuJoCo's own at its strongest impedance, 0.9999. The
+// force error that it leaves falls with R, the rounding error of the force rises with 1/R; in
+// between lie four decades where neither is seen.
+constexpr double kSoftness = 1e-5, kLeastSoftness = 1e-9;
+// Fewer rows are never so soft as to be looked at.
+constexpr int kManyRows = 200;
+// The share of an expected force that may come back, and iterations and size of the forces, beside
+// the largest one, that find it.
+constexpr double kMostReturned = 0.02, kProbe = 1e-3;
+constexpr int kProbes = 10;
 
 }  // namespace
 
 Integrator::Integrator(Session* session, double h)
-    : s_(*session), m_(session->engine.m.get()), d_(session->data.get()) {
+    : s_(*session), m_(session->engine.m.get()), d_(session->data.get()), softness_(kSoftness) {
   const double tc = session->options.guidance_steps * h;
   b_ = 2.0 / tc;
   k_ = 1.0 / (tc * tc);
@@ -82,7 +93,51 @@ void Integrator::Start(const Commanded& first) {
   warm_ = qacc();
   Evaluate(q_, v_, first, 0.0);
   for (int i = 0; i < kStartRepeats; ++i) SolveAgain();
+  if (s_.system.rows() >= kManyRows) Harden(first);
   RememberNode();
+}
+
+// The largest eigenvalue of (A + R)⁻¹R beside self-stress, by power iteration. The data's forces
+// and accelerations stay.
+double Integrator::ShareReturned() {
+  const VecX force = s_.system.force(), acceleration = qacc(), unit = s_.system.row_unit();
+  const auto found = [&](const VecX& more) -> VecX {
+    expected_ = force + more;
+    ApplyReference();
+    SolveConstraints();
+    return s_.system.force();
+  };
+  const auto size = [&](const VecX& x) { return x.cwiseProduct(unit).norm(); };
+  const double largest = force.cwiseProduct(unit).lpNorm<Eigen::Infinity>();
+  const double probe = kProbe * (largest > 0.0 ? largest : 1.0);
+  VecX more(force.size());
+  for (Eigen::Index i = 0; i < more.size(); ++i) {
+    more[i] = (1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i))) / unit[i];
+  }
+  const VecX none = found(VecX::Zero(force.size()));
+  double share = 0.0;
+  for (int i = 0; i < kProbes; ++i) {
+    more *= probe / size(more);
+    const VecX back = found(more) - none;
+    share = size(back) / probe;
+    if (!(share > 0.0)) break;
+    more = back;
+  }
+  std::copy(acceleration.begin(), acceleration.end(), d_->qacc);
+  s_.system.force() = force;
+  return share;
+}
+
+void Integrator::Harden(const Commanded& first) {
+  const double share = ShareReturned();
+  if (!(share > kMostReturned)) return;
+  // ρ/(1 − ρ) is in proportion to R.
+  const double ratio =
+      share < 1.0 ? share / (1.0 - share) : std::numeric_limits<double>::infinity();
+  softness_ = std::max(kLeastSoftness, kSoftness * kMostReturned / ratio);
+  warm_ = qacc();
+  Evaluate(q_, v_, first, 0.0);
+  for (int i = 0; i < kStartRepeats; ++i) SolveAgain();
 }
 
 void Integrator::MultiStep(double h, const Commanded& end, double end_s) {
@@ -235,10 +290,6 @@ void Integrator::Evaluate(const VecX& q, const VecX& v, const Commanded& at, dou
 
 namespace {
 
-// Softness R of a constraint row relative to MuJoCo's own at its strongest impedance, 0.9999. The
-// force error that it leaves falls with R, the rounding error of the force rises with 1/R; in
-// between lie four decades where neither is seen.
-constexpr double kSoftness = 1e-5;
 // How far off the acceleration is that the solver starts from [m/s², rad/s²].
 constexpr double kNudge = 1e-9;
 // What MuJoCo's solver takes to decide which rows of friction give way.
@@ -345,7 +396,7 @@ void Integrator::HoldFriction(const VecX& gives) {
   for (Eigen::Index row = 0; row < gives.size(); ++row) {
     const int i = s_.system.rows() + static_cast<int>(row);
     const double loss = s_.system.HeldLoss(static_cast<int>(row));
-    d_->efc_R[i] = kSoftness * friction_R_[row];
+    d_->efc_R[i] = softness_ * friction_R_[row];
     d_->efc_D[i] = 1.0 / d_->efc_R[i];
     d_->efc_frictionloss[i] = loss > 0.0 && gives[row] == 0.0 ? kUnbounded : loss;
     d_->efc_aref[i] = friction_aref_[row] + kBeyond * gives[row] * loss * d_->efc_diagApprox[i];
@@ -395,7 +446,7 @@ void Integrator::SetReference(const VecX& v, const DrivenSample& at, Guidance gu
   if (guidance == Guidance::kNew) guidance_ = b_ * rate_ + k_ * s_.system.residual();
   aref_ -= guidance_;
   Eigen::Map<VecX> R(d_->efc_R, rows);
-  R = kSoftness * R.cwiseProduct(R_unit_).cwiseMin(largest_R_);
+  R = softness_ * R.cwiseProduct(R_unit_).cwiseMin(largest_R_);
   Eigen::Map<VecX>(d_->efc_D, rows) = R.cwiseInverse();
   SetFrictionRows(v);
   ApplyReference();

@@ -6,7 +6,10 @@
 //   aref = ẍ_ref − J̇q̇ − b (J q̇ − ẋ_ref) − k r + R f̂,   b = 2/tc, k = 1/tc²                   (1)
 // (closures: ẍ_ref = ẋ_ref = 0). R, the softness of MuJoCo's constraints, is lowered beyond the
 // bound that the impedance limit sets, and the force f̂ expected from the last nodes cancels what
-// is left of it. Between nodes:
+// is left of it. With A = J M⁻¹ Jᵀ the share ρ of (A + R)⁻¹R in an expected force comes back in the
+// force found: it is nothing but where many loops in a row hardly resist, A ~ 1/loops⁴. Forces
+// expected by the cubic through four nodes grow from node to node where ρ > 1/5, whatever the step:
+// at the start R is made so small that ρ is far below. Between nodes:
 //   predictor  v* = v_n + h/24 (55 a_n − 59 a_{n−1} + 37 a_{n−2} − 9 a_{n−3}) (2)
 //              q* = q_n ⊕ (h v_n + h²/360 (323 a_n − 264 a_{n−1} + 159 a_{n−2} − 38 a_{n−3})) (3)
 //   evaluate   a_{n+1}, f_{n+1} at (q*, v*): the state that is recorded
@@ -84,6 +87,8 @@ class Integrator {
   void SolveSmooth();
   void Settle();
   void SolveAgain();
+  [[nodiscard]] double ShareReturned();
+  void Harden(const Commanded& first);
   void RememberNode();
   [[nodiscard]] bool PassesSingularPose();
   void Coast();
@@ -97,6 +102,7 @@ class Integrator {
   const mjModel* const m_;
   mjData* const d_;
   double b_ = 0.0, k_ = 0.0;  // of (1)
+  double softness_;           // R by MuJoCo's own at its strongest impedance, 0.9999
   VecX largest_R_;            // per row [1/kg], [1/(kg m²)]
   VecX R_unit_;               // per row: what MuJoCo's own R is multiplied by
   VecX largest_friction_R_;   // the same, per row of friction

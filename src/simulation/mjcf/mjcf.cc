@@ -102,11 +102,11 @@ class MjcfWriter {
   }
 
   void WriteFree(const PlannedJoint& joint) {
-    const mjcf::PlannedForces forces = mjcf::ForcesOfJoint(mechanism_, joint.joint, 0);
-    xml_.Open(forces.any() && mjcf::HasEqualForces(mechanism_, joint.joint) ? "joint"
-                                                                            : "freejoint");
+    const bool forces = joint.joint >= 0 && mjcf::ForcesOfJoint(mechanism_, joint.joint, 0).any() &&
+                        mjcf::HasEqualForces(mechanism_, joint.joint);
+    xml_.Open(forces ? "joint" : "freejoint");
     xml_.Set("name", joint.name);
-    if (forces.any() && mjcf::HasEqualForces(mechanism_, joint.joint)) {
+    if (forces) {
       xml_.Set("type", "free");
       WriteForces(joint, 0);
     }
@@ -468,11 +468,13 @@ void WriteDefaults(const Sections& s) {
 // From this many DOFs on, MuJoCo's sparse constraint solver is faster.
 constexpr int kSparseFrom = 40;
 
-int DofsOfTree(const Mechanism& mechanism) {
+// Closing joints of loops apart.
+int DofsOfTree(const Sections& s) {
   int dofs = 0;
-  for (const int j : mechanism.tree_joints) {
-    dofs += DofsOf(mechanism.joints[static_cast<size_t>(j)].kind);
+  for (const int j : s.mechanism.tree_joints) {
+    dofs += DofsOf(s.mechanism.joints[static_cast<size_t>(j)].kind);
   }
+  for (const PlannedBody& body : s.plan.bodies) dofs += HasPlace(body) ? 6 : 0;
   return dofs;
 }
 
@@ -480,6 +482,12 @@ int DofsOfTree(const Mechanism& mechanism) {
 
 void WriteHead(const Sections& s) {
   s.xml->Comment(HeadComment(s.mechanism, s.options));
+  if (std::ranges::any_of(s.plan.bodies, HasPlace)) {
+    s.xml->Comment(
+        " Bodies that hang on each other in long chains are cut into shorter ones: the first body "
+        "of each has its place by a free joint place:BODY, and the equality close:JOINT holds it "
+        "to the joint on which it hangs in the mechanism. ");
+  }
   s.xml->Open("compiler");
   s.xml->Set("angle", "radian");
   s.xml->Set("autolimits", "false");
@@ -491,7 +499,7 @@ void WriteHead(const Sections& s) {
   s.xml->Set("integrator", s.options.runge_kutta ? "RK4" : "Euler");
   s.xml->Set("solver", "Newton");
   s.xml->Set("tolerance", "1e-14");
-  s.xml->Set("jacobian", DofsOfTree(s.mechanism) < kSparseFrom ? "dense" : "sparse");
+  s.xml->Set("jacobian", DofsOfTree(s) < kSparseFrom ? "dense" : "sparse");
   s.xml->Open("flag");
   s.xml->Set("contact", "disable");
   s.xml->Set("energy", "enable");

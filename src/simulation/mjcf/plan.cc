@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/demand.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
 #include "mechanism/spanning_tree.h"
@@ -60,14 +61,26 @@ std::vector<Motion1> MotionsOf(const Joint& joint, const Mat3& R_WF, const Mat3&
   return {};
 }
 
+// A tree that nests at most this many bodies stays whole. A deeper one is cut where more than the
+// second number have nested since the last cut: at a joint whose coordinate nothing uses, beyond
+// the third number at any. Of scissors, storeys and one long loop, whose costs cross there.
+constexpr int kWholeTree = 32, kCutFrom = 6, kCutAnywhere = 12;
+
 class Planner {
  public:
   explicit Planner(const Mechanism& mechanism)
-      : mechanism_(mechanism), attached_(CountAttachments()) {}
+      : mechanism_(mechanism), attached_(CountAttachments()), cuts_(IsDeep()) {
+    if (!cuts_) return;
+    spins_.assign(mechanism.bodies.size(), false);
+    for (const Spin& spin : IdleSpins(mechanism)) {
+      for (const int body : spin.bodies) spins_[static_cast<size_t>(body)] = true;
+    }
+  }
 
   Plan Make() {
     const size_t n = mechanism_.bodies.size();
     plan_.bodies.push_back({.name = "world", .joints = {}});
+    nested_.assign(1, 0);
     plan_.body_of.assign(n, -1);
     plan_.body_of[0] = 0;
     plan_.tiny_mass.assign(n, false);
@@ -75,7 +88,7 @@ class Planner {
     pending_.assign(n, {});
     for (size_t k = 0; k < mechanism_.tree_joints.size(); ++k) AddTreeBody(k);
     for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
-      if (mechanism_.joints[j].closure) AddClosure(static_cast<int>(j));
+      if (mechanism_.joints[j].closure) AddClosure(static_cast<int>(j), SplitsParent(j));
     }
     AssignMasses();
     return std::move(plan_);
@@ -103,6 +116,30 @@ class Planner {
       if (IsGyroscopic(element)) ++count[std::get<RotorLaw>(element.law).carrier->body];
     }
     return count;
+  }
+
+  // More bodies hang on each other than a whole tree nests.
+  bool IsDeep() const {
+    std::vector<int> depth(mechanism_.bodies.size(), 0);
+    int deepest = 0;
+    for (size_t k = 0; k < mechanism_.tree_joints.size(); ++k) {
+      int& own = depth[static_cast<size_t>(OutboardBody(mechanism_, k))];
+      own = depth[static_cast<size_t>(InboardBody(mechanism_, k))] + 1;
+      deepest = std::max(deepest, own);
+    }
+    return deepest > kWholeTree;
+  }
+
+  // Whether a body with mass of its own, whose tree joint would nest it `nested` deep, gets its
+  // place from the world instead. Spins about a line through two balls are read from the tree.
+  bool IsCutAt(size_t k, int nested) const {
+    if (!cuts_ || nested <= kCutFrom) return false;
+    const int j = mechanism_.tree_joints[k];
+    const int inboard = InboardBody(mechanism_, k), outboard = OutboardBody(mechanism_, k);
+    if (mechanism_.joints[j].kind == JointKind::kFree || plan_.body_of[inboard] < 0) return false;
+    if (IsMassless(mechanism_.bodies[outboard]) || spins_[inboard] || spins_[outboard])
+      return false;
+    return nested > kCutAnywhere || !HasUsedCoordinate(mechanism_, j);
   }
 
   // The MuJoCo joints of a joint when its outboard body hangs on its inboard body.
@@ -169,13 +206,30 @@ class Planner {
       return;
     }
     plan_.body_of[body] = static_cast<int>(plan_.bodies.size());
-    plan_.bodies.push_back({.name = mechanism_.bodies[body].name,
-                            .body = body,
-                            .parent = inboard_[body],
-                            .joints = std::move(joints)});
+    const std::string& name = mechanism_.bodies[body].name;
+    if (const int nested = nested_[inboard_[body]] + 1; IsCutAt(k, nested)) {
+      AddBody({.name = name,
+               .body = body,
+               .joints = {{.name = PlaceName(mechanism_.bodies[body]), .type = Type::kFree}}});
+      return AddClosure(j, reversed);
+    }
+    AddBody({.name = name, .body = body, .parent = inboard_[body], .joints = std::move(joints)});
   }
 
-  void AddClosure(int j) {
+  void AddBody(PlannedBody body) {
+    nested_.push_back(nested_[body.parent] + 1);
+    plan_.bodies.push_back(std::move(body));
+  }
+
+  bool SplitsParent(size_t j) const {
+    const Joint& joint = mechanism_.joints[j];
+    const bool child_is_world_or_massless =
+        joint.child == 0 || IsMassless(mechanism_.bodies[joint.child]);
+    return child_is_world_or_massless && joint.parent != 0;
+  }
+
+  // `split_parent`: which of its bodies would be split.
+  void AddClosure(int j, bool split_parent) {
     const Joint& joint = mechanism_.joints[j];
     const bool driven = HasUsedCoordinate(mechanism_, j);
     PlannedClosure closure{.name = ClosureName(joint),
@@ -188,6 +242,7 @@ class Planner {
     } else if (joint.kind == JointKind::kFixed) {
       closure.type = PlannedClosure::Type::kWeld;
     } else {
+      closure.split_parent = split_parent;
       SplitBody(joint, &closure);
     }
     plan_.closures.push_back(closure);
@@ -196,18 +251,15 @@ class Planner {
   // The half hangs on the other body of the joint.
   void SplitBody(const Joint& joint, PlannedClosure* closure) {
     closure->type = PlannedClosure::Type::kSplit;
-    const bool child_is_world_or_massless =
-        joint.child == 0 || IsMassless(mechanism_.bodies[joint.child]);
-    closure->split_parent = child_is_world_or_massless && joint.parent != 0;
     const int body = closure->split_parent ? joint.parent : joint.child;
     const int other = closure->split_parent ? joint.child : joint.parent;
     closure->body1 = plan_.body_of[body];
     closure->body2 = static_cast<int>(plan_.bodies.size());
-    plan_.bodies.push_back({.name = joint.name + ".half",
-                            .body = body,
-                            .half_of = closure->joint,
-                            .parent = plan_.body_of[other],
-                            .joints = JointsOf(closure->joint, closure->split_parent, other)});
+    AddBody({.name = joint.name + ".half",
+             .body = body,
+             .half_of = closure->joint,
+             .parent = plan_.body_of[other],
+             .joints = JointsOf(closure->joint, closure->split_parent, other)});
   }
 
   void AssignMasses() {
@@ -234,7 +286,10 @@ class Planner {
 
   const Mechanism& mechanism_;
   const std::vector<int> attached_;
+  const bool cuts_;
+  std::vector<bool> spins_;  // per body, where the tree is cut: part of an idle spin
   Plan plan_;
+  std::vector<int> nested_;                         // per planned body: bodies it hangs on, and it
   std::vector<int> inboard_;                        // plan index that a (merged) body hangs on
   std::vector<std::vector<PlannedJoint>> pending_;  // joints of merged bodies
 };
@@ -266,6 +321,7 @@ std::string JointName(const Joint& joint, int coordinate) {
   return joint.name + "." + std::to_string(coordinate);
 }
 
+std::string PlaceName(const Body& body) { return "place:" + body.name; }
 std::string ClosureName(const Joint& joint) { return "close:" + joint.name; }
 std::string DriveEqualityName(const Drive& drive) { return "drive:" + drive.name; }
 std::string BaseEqualityName(const Prescribed& base) { return "base:" + base.name; }

@@ -12,6 +12,9 @@
 // * Closures: ball and force-only joints are `connect`, fixed ones `weld`. Any other kind is
 //   represented exactly by splitting the closing body into equal halves: the new half hangs on
 //   the closing joint like a tree body, and the halves are welded together.
+// * A deep tree is cut: MuJoCo's inertia matrix of bodies that nest is dense, and its XML reader
+//   takes no deep nesting. At a cut a body with all that hangs on it has its place from the world,
+//   on a free joint that the mechanism does not have, and its tree joint is closed as a closure is.
 #pragma once
 
 #include <array>
@@ -28,7 +31,7 @@ struct PlannedJoint {
   enum class Type { kHinge, kSlide, kBall, kFree };
   std::string name;  ///< JOINT, or JOINT.k for coordinate k of a joint with several DOFs
   Type type = Type::kHinge;
-  int joint = -1;       ///< Mechanism::joints
+  int joint = -1;       ///< Mechanism::joints; -1: a free joint where the tree is cut
   int coordinate = -1;  ///< of that joint; -1 for ball, free, and the slides and ball of a free
                         ///< joint inside the tree
   Vec3 axis_W = Vec3::UnitZ();    ///< hinge and slide: at home, positive as the coordinate
@@ -47,11 +50,16 @@ struct PlannedBody {
   Mat3 I_Bcm_B = Mat3::Zero();       ///< [kg m²], as `mass`
 };
 
+/// True where the tree is cut: the body has its place from the world.
+[[nodiscard]] inline bool HasPlace(const PlannedBody& body) {
+  return body.joints.size() == 1 && body.joints[0].joint < 0;
+}
+
 struct PlannedClosure {
   enum class Type { kConnect, kWeld, kSplit };
   Type type = Type::kConnect;
   std::string name;  ///< of the equality constraint: "close:JOINT"
-  int joint = -1;    ///< Mechanism::joints
+  int joint = -1;    ///< Mechanism::joints; a tree joint where the tree is cut
   int body1 = 0;     ///< Plan::bodies: the joint's child; for a split, the whole body's rest
   int body2 = 0;     ///< Plan::bodies: the joint's parent; for a split, the half
   bool split_parent = false;  ///< the parent body was split, not the child
@@ -117,6 +125,9 @@ struct PlannedForces {
 
 /// Name of the MuJoCo joint of a joint's coordinate.
 [[nodiscard]] std::string JointName(const Joint& joint, int coordinate);
+
+/// Name of the free joint on which a body has its place where the tree is cut: "place:BODY".
+[[nodiscard]] std::string PlaceName(const Body& body);
 
 /// Names of the equality constraints.
 [[nodiscard]] std::string ClosureName(const Joint& joint);           // "close:JOINT"
