@@ -80,11 +80,9 @@ class Literals {
 /// are what they were. Items with findings are read each time.
 class ItemMemory {
  public:
-  /// Before the items of a load are read. Where others than the values of its parameters differ
-  /// from those of the load before, nothing is known. `bodies` outlive the load.
+  /// Before the items of a load are read. Where its parameters are not those of the load before,
+  /// but for their values, nothing is known. `bodies` outlive the load.
   void Begin(const std::vector<Parameter>& parameters, const std::vector<Body>& bodies);
-  /// After a load with errors: some items are those of it.
-  void Forget() { *this = {}; }
 
   /// The next item of the load; false where it is not kept: a part of another item, or of a block
   /// that no file contains.
