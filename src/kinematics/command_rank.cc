@@ -75,18 +75,17 @@ CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>&
   const int columns = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
   CommandRank out;
   for (const Command& command : commands) AddCommand(mechanism, home, command, &rows);
-  const internal::SparseRows J = rows.Matrix();
-  const internal::NestedRanks ranks = internal::RanksOf(J, held_rows);
+  const internal::NestedRanks ranks = internal::RanksInTree(rows, mechanism, home, held_rows);
 
   out.dofs = columns - ranks.first;
   out.undriven = columns - ranks.all;
   out.redundant = static_cast<int>(commands.size()) - (out.dofs - out.undriven);
   if (out.undriven > 0) {
-    const MatX motion = FindRank(J, NullSpaces::kMotion).motion;
+    const MatX motion = FindRank(rows.Matrix(), NullSpaces::kMotion).motion;
     out.free_joints = MovingJoints(mechanism, home, motion);
   }
   if (out.redundant <= 0) return out;
-  const MatX stress = FindRank(J, NullSpaces::kSelfStress).self_stress;
+  const MatX stress = FindRank(rows.Matrix(), NullSpaces::kSelfStress).self_stress;
   for (size_t k = 0; k < commands.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(held_rows) + static_cast<Eigen::Index>(k);
     if (stress.row(row).cwiseAbs().maxCoeff() > internal::kStressTolerance) {

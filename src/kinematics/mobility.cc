@@ -168,7 +168,7 @@ IsostaticDofs CountIsostaticDofs(const Mechanism& mechanism) {
       stack.Add(rows.parent, rows.J_parent.row(i), rows.child, rows.J_child.row(i), false);
     }
   }
-  const internal::NestedRanks ranks = internal::RanksOf(stack.Matrix(), reactions);
+  const internal::NestedRanks ranks = internal::RanksInTree(stack, mechanism, states, reactions);
   const int columns = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
   return {.dofs = columns - ranks.all, .as_balls = columns - ranks.first};
 }

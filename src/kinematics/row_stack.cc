@@ -8,6 +8,7 @@
 
 #include "base/demand.h"
 #include "kinematics/constraints.h"
+#include "kinematics/tree_motion.h"
 #include "math/sparse.h"
 
 namespace mbv::internal {
@@ -53,7 +54,14 @@ void RowStack::Add(const ConstraintRows& rows) {
 void RowStack::Add(const CouplingRow& row) { AddSum(row.pieces, !row.angular); }
 
 void RowStack::AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions) {
-  for (const Joint& joint : mechanism.joints) Add(RowsOf(joint, states, reactions));
+  for (const Joint& joint : mechanism.joints) {
+    const int before = size();
+    Add(RowsOf(joint, states, reactions));
+    const bool whole = !reactions || !joint.transmits_force_only;
+    for (int row = before; row < size() && whole && !joint.closure; ++row) {
+      tree_rows_.push_back(row);
+    }
+  }
   for (const CouplingRow& row : CouplingRows(mechanism, states)) Add(row);
 }
 
@@ -86,6 +94,8 @@ SparseRows RowStack::Matrix() const {
 }
 
 namespace {
+
+constexpr double kClearGap = 1e3;  // of a gap, on both sides of the tolerance
 
 using Places = std::vector<Eigen::Index>;
 
@@ -238,15 +248,15 @@ std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSp
 
 }  // namespace
 
-std::optional<NestedRanks> ClearRanks(const SparseRows& J, Eigen::Index first, double tolerance) {
-  constexpr double kClear = 1e3;  // on both sides of the tolerance
-  double largest = 0.0, largest_first = 0.0;
+std::optional<NestedRanks> ClearRanks(const SparseRows& J, Eigen::Index first, double tolerance,
+                                      double largest) {
+  double largest_row = 0.0, largest_first = 0.0;
   for (Eigen::Index i = 0; i < J.rows(); ++i) {
-    largest = std::max(largest, J.row(i).norm());
-    if (i < first) largest_first = largest;
+    largest_row = std::max(largest_row, J.row(i).norm());
+    if (i < first) largest_first = largest_row;
   }
-  const double least_kept = kClear * tolerance * largest;
-  const double most_dropped = tolerance * (first > 0 ? largest_first : largest) / kClear;
+  const double least_kept = kClearGap * tolerance * std::max(largest, largest_row);
+  const double most_dropped = tolerance * (first > 0 ? largest_first : largest_row) / kClearGap;
   NestedRanks ranks;
   for (const Part& part : PartsOf(J)) {
     if (part.empty()) continue;
@@ -290,6 +300,66 @@ NestedRanks RanksOf(const SparseRows& J, Eigen::Index first) {
   const SparseRows top = J.topRows(first);
   return {.first = FindRank(top, NullSpaces::kNone).rank,
           .all = FindRank(J, NullSpaces::kNone).rank};
+}
+
+namespace {
+
+// A basis of unit length of the motions that the tree's joints leave free; empty where the rows of
+// the tree in J and the tree's coordinates are not just what there is, or poses do not fit.
+std::optional<MatX> FreeInTree(const RowStack& rows, const Mechanism& mechanism,
+                               const BodyStates& states, const SparseRows& tree_rows,
+                               double largest) {
+  constexpr double kLeastPivot = 1e-4;  // of the largest
+  const TreeMotion tree(mechanism, std::vector<bool>(mechanism.joints.size(), false));
+  if (tree.dofs() == 0 || tree_rows.rows() + tree.dofs() != tree_rows.cols()) return {};
+  MatX motion = tree.Jacobian(states).bottomRows(tree_rows.cols());
+  for (Eigen::Index b = 3; b < motion.rows(); b += 6) motion.middleRows<3>(b) /= rows.length();
+  const Eigen::HouseholderQR<MatX> qr(motion);
+  const VecX pivots = qr.matrixQR().diagonal().cwiseAbs();
+  if (!(pivots.minCoeff() > kLeastPivot * pivots.maxCoeff())) return {};
+  MatX free = qr.householderQ() * MatX::Identity(motion.rows(), motion.cols());
+  const double held = tree_rows.rows() == 0 ? 0.0 : (tree_rows * free).cwiseAbs().maxCoeff();
+  return held <= kRankTolerance * largest / kClearGap ? std::optional(std::move(free))
+                                                      : std::nullopt;
+}
+
+SparseRows Chosen(const SparseRows& J, const std::vector<int>& which) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (size_t i = 0; i < which.size(); ++i) {
+    for (SparseRows::InnerIterator entry(J, which[i]); entry; ++entry) {
+      entries.emplace_back(static_cast<int>(i), entry.col(), entry.value());
+    }
+  }
+  SparseRows some(static_cast<Eigen::Index>(which.size()), J.cols());
+  some.setFromTriplets(entries.begin(), entries.end());
+  return some;
+}
+
+}  // namespace
+
+NestedRanks RanksInTree(const RowStack& rows, const Mechanism& mechanism, const BodyStates& states,
+                        Eigen::Index first) {
+  constexpr Eigen::Index kSmall = 48;  // columns: a dense matrix is as fast
+  const SparseRows J = rows.Matrix();
+  if (J.cols() <= kSmall || J.cols() > kLargestDense) return RanksOf(J, first);
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < J.rows(); ++i) largest = std::max(largest, J.row(i).norm());
+  const std::vector<int>& of_tree = rows.tree_rows();
+  const auto free = FreeInTree(rows, mechanism, states, Chosen(J, of_tree), largest);
+  if (!free) return RanksOf(J, first);
+  std::vector<int> others;
+  int others_first = 0, tree_first = 0;
+  for (int row = 0, at = 0; row < rows.size(); ++row) {
+    const bool tree = at < static_cast<int>(of_tree.size()) && of_tree[at] == row;
+    at += tree ? 1 : 0;
+    if (!tree) others.push_back(row);
+    if (row < first) (tree ? tree_first : others_first) += 1;
+  }
+  const SparseRows left = SparseOf(Chosen(J, others) * *free);
+  const auto clear = ClearRanks(left, others_first, kRankTolerance, largest);
+  // The first rows must have all of the tree.
+  if (!clear || tree_first != static_cast<int>(of_tree.size())) return RanksOf(J, first);
+  return {.first = tree_first + clear->first, .all = tree_first + clear->all};
 }
 
 int RankOf(const SparseRows& J, double tolerance) {

@@ -52,6 +52,9 @@ class RowStack {
   void AddDriven(const Mechanism& mechanism, const BodyStates& states);
 
   [[nodiscard]] int size() const { return static_cast<int>(rows_.size()); }
+  [[nodiscard]] double length() const { return length_; }
+  /// Which rows are all those of a joint of the spanning tree.
+  [[nodiscard]] const std::vector<int>& tree_rows() const { return tree_rows_; }
   /// Without the entries that are zero.
   [[nodiscard]] SparseRows Matrix() const;
 
@@ -62,6 +65,7 @@ class RowStack {
   Eigen::Index columns_;
   double length_;
   std::vector<Row> rows_;
+  std::vector<int> tree_rows_;
 };
 
 struct RankFinding {
@@ -92,8 +96,14 @@ struct NestedRanks {
 };
 /// Both for the time of one.
 [[nodiscard]] NestedRanks RanksOf(const SparseRows& J, Eigen::Index first);
-/// By QR alone; empty where a gap is not clear.
+/// By QR alone; empty where a gap is not clear. What counts is compared with the largest row, or
+/// with `largest`.
 [[nodiscard]] std::optional<NestedRanks> ClearRanks(const SparseRows& J, Eigen::Index first,
-                                                    double tolerance = kRankTolerance);
+                                                    double tolerance = kRankTolerance,
+                                                    double largest = 0.0);
+/// RanksOf() of rows at poses that the spanning tree's joints fit. In what these leave free the
+/// other rows make a small matrix, whose rank counts beside theirs where it is clear.
+[[nodiscard]] NestedRanks RanksInTree(const RowStack& rows, const Mechanism& mechanism,
+                                      const BodyStates& states, Eigen::Index first);
 
 }  // namespace mbv::internal

@@ -15,6 +15,7 @@
 #include "base/files.h"
 #include "base/text.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/same_geometry.h"
 #include "model_file/model_bodies.h"
 #include "model_file/model_checks.h"
 #include "model_file/model_contacts.h"
@@ -523,10 +524,82 @@ Diagnostics WithoutPlaces(const Diagnostics& diagnostics) {
   return result;
 }
 
+// How the loops of a geometry close where closing them found nothing to report.
+class ClosedHome {
+ public:
+  /// Before the loops are closed.
+  void Remember(const internal::ClosureRules& rules, const Mechanism& given) {
+    rules_ = rules;
+    given_ = {};
+    for (const Body& body : given.bodies) {
+      given_.bodies.push_back({.name = "",
+                               .mass = body.mass,
+                               .p_BoBcm_B = body.p_BoBcm_B,
+                               .I_Bcm_B = body.I_Bcm_B,
+                               .frames = {},
+                               .shapes = {}});
+    }
+    given_.joints = given.joints;
+    given_.drives = given.drives;
+    given_.prescribed = given.prescribed;
+    given_.outputs = given.outputs;
+    given_.couplings = given.couplings;
+    given_.tree_joints = given.tree_joints;
+    given_.tree_reversed = given.tree_reversed;
+    joints_.clear();
+  }
+  /// Afterwards.
+  void Keep(const Mechanism& closed) {
+    joints_ = closed.joints;
+    X_WB_home_ = closed.X_WB_home;
+  }
+  /// True, and the mechanism is closed, where its geometry is that of the last one.
+  bool Take(const internal::ClosureRules& rules, Mechanism* mechanism) const {
+    const bool same = !joints_.empty() && rules_.tolerance_m == rules.tolerance_m &&
+                      rules_.assembly == rules.assembly && rules_.guessed == rules.guessed &&
+                      HaveSameGeometry(given_, *mechanism);
+    if (!same) return false;
+    mechanism->joints = joints_;
+    mechanism->X_WB_home = X_WB_home_;
+    return true;
+  }
+
+ private:
+  internal::ClosureRules rules_;
+  Mechanism given_;  // without what has no influence
+  std::vector<Joint> joints_;
+  std::vector<Pose> X_WB_home_;
+};
+
+// What later loads of a document with other numbers take over.
+struct LoadMemory {
+  YamlNodePtr root;
+  std::string file;
+  internal::ParameterTexts texts;
+  internal::ItemMemory items;
+  ClosedHome home;
+};
+
+// Of the document that this thread loaded last; null where documents are not kept, and of robots,
+// whose files are read each time.
+LoadMemory* MemoryOf(const std::string& text, const std::string& file, const LoadOptions& options) {
+  thread_local LoadMemory memory;
+  const YamlNodePtr root = ParsedDocuments::Find(text);
+  const bool robot = IsRobotFile(file) || (root != nullptr && root->Find("urdf") != nullptr);
+  if (root == nullptr || robot || !options.literals.empty() || !options.plants.empty()) {
+    return nullptr;
+  }
+  if (memory.root != root || memory.file != file) {
+    memory = {.root = root, .file = file, .texts = {}, .items = {}, .home = {}};
+  }
+  return &memory;
+}
+
 // One model file on its way to a mechanism: what every stage reads with, nothing that it reads.
 struct Reading {
   const LoadOptions& options;
-  bool bare_urdf = false;  // the text stands for a URDF file
+  LoadMemory* memory = nullptr;  // null: nothing is taken over
+  bool bare_urdf = false;        // the text stands for a URDF file
   PrintedRounding printed;
   YamlReader yaml;
   Diagnostics others;  // findings of other files: overrides, URDF, parameters
@@ -654,7 +727,9 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   ModelSections s;
   internal::ModelValues values(&yaml, &reading->literals);
   internal::ModelBlocks blocks(&root);
-  internal::ParameterReader parameters(reading->options, &yaml, &reading->others);
+  internal::ParameterReader parameters(
+      reading->options, &yaml, &reading->others,
+      reading->memory == nullptr ? nullptr : &reading->memory->texts);
   s.head = internal::ReadTitle(file, &yaml);
   parameters.ReadModel(blocks.model(), file);
   internal::ReadSurroundings(blocks.model(), file, reading->options.gravity_W, &values, &s.head);
@@ -663,6 +738,10 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   internal::ExpandLegs(&values, &blocks);
   parameters.CheckOverrides();
   s.parameters = parameters.Take();
+  if (reading->memory != nullptr) {
+    reading->memory->items.Begin(s.parameters, s.bodies.bodies);
+    values.Remember(&reading->memory->items);
+  }
 
   // Each stage over all blocks, so that every name it refers to is there.
   const auto each_block = [&](const auto& stage) {
@@ -752,17 +831,28 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
   if (!s.joints.good || !internal::CheckTree(s.joints.hints, mechanism, &report)) return;
   if (report.has_errors()) return;
   const double by_option_m = reading->options.closure_tolerance_m;
-  internal::CloseLoops(
-      {.tolerance_m = std::isfinite(by_option_m) ? by_option_m : s.head.closure_tolerance_m,
-       .printed = std::isfinite(by_option_m) ? PrintedRounding{} : reading->printed,
-       .bare_urdf = reading->bare_urdf,
-       .is_robot = is_robot,
-       .assembly = reading->options.assembly,
-       .guessed = s.joints.guessed},
-      mechanism, &report);
-  if (report.has_own_errors()) return;
+  const internal::ClosureRules rules{
+      .tolerance_m = std::isfinite(by_option_m) ? by_option_m : s.head.closure_tolerance_m,
+      .printed = std::isfinite(by_option_m) ? PrintedRounding{} : reading->printed,
+      .bare_urdf = reading->bare_urdf,
+      .is_robot = is_robot,
+      .assembly = reading->options.assembly,
+      .guessed = s.joints.guessed};
+  ClosedHome* home = reading->memory == nullptr ? nullptr : &reading->memory->home;
+  const bool known = home != nullptr && home->Take(rules, mechanism);
+  const size_t findings = report.findings();
+  if (!known) {
+    if (home != nullptr) home->Remember(rules, *mechanism);
+    internal::CloseLoops(rules, mechanism, &report);
+    if (report.has_own_errors()) return;
+  }
+  const bool closed = report.findings() == findings;
   internal::CheckHome(*mechanism, &report);
-  internal::CheckIsostaticRule(*mechanism, &report);
+  if (!known) {
+    const size_t before = report.findings();
+    internal::CheckIsostaticRule(*mechanism, &report);
+    if (home != nullptr && closed && report.findings() == before) home->Keep(*mechanism);
+  }
   internal::CheckPlausible(*mechanism, &report);
   for (const internal::ContactFinding& finding : internal::PlantContacts(s.contacts, mechanism)) {
     report.At(finding.place, Severity::kError, finding.message, finding.hint);
@@ -793,10 +883,9 @@ std::string ModelFileText(const std::string& text, const std::string& file) {
   return internal::IsUrdfFile(file) ? internal::UrdfModelText(file, text) : text;
 }
 
-LoadResult LoadFrom(const std::string& text, Reading reading) {
+LoadResult LoadFrom(const YamlNodePtr& root, Reading reading) {
   LoadResult result;
   std::optional<Mechanism> mechanism;
-  const YamlNodePtr root = reading.yaml.Parse(text);
   if (auto sections = root == nullptr ? std::nullopt : ReadModel(*root, &reading)) {
     for (const auto* more : {&sections->head.left_out, &sections->urdf.left_out}) {
       reading.caveats.insert(reading.caveats.end(), more->begin(), more->end());
@@ -848,9 +937,17 @@ std::string XacroHint(const std::string& file) {
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,
                          const LoadOptions& options) {
+  if (LoadMemory* memory = MemoryOf(text, file, options)) {
+    Reading reading = ReadingOf(file, options);
+    reading.memory = memory;
+    LoadResult loaded = LoadFrom(memory->root, std::move(reading));
+    if (loaded.mechanism) return loaded;
+    *memory = {};  // what was read belongs to two loads; the findings are those of a new one
+  }
   Reading reading = ReadingOf(file, options);
   if (reading.bare_urdf) reading.printed = RoundingOf(text);
-  return LoadFrom(ModelFileText(text, file), std::move(reading));
+  const YamlNodePtr root = reading.yaml.Parse(ModelFileText(text, file));
+  return LoadFrom(root, std::move(reading));
 }
 
 LoadedBodies LoadBodiesText(const std::string& text, const std::string& file) {

@@ -40,7 +40,9 @@ void FrameReader::Read(const Block& block, const YamlNode& node, const std::stri
       yaml.Error(entry, fmt::format("{}: a frame '{}' is there already", path, name));
       continue;
     }
-    const auto pose = values_.PoseOf(block, *entry.value, JoinPath(path, entry.key));
+    const auto pose = values_.Item<Pose>(block, *entry.value, [&] {
+      return values_.PoseOf(block, *entry.value, JoinPath(path, entry.key));
+    });
     // A bad frame keeps its name, so that references to it are not reported as well.
     frames.push_back({name, pose.value_or(Pose::Identity())});
   }
@@ -74,18 +76,22 @@ void BodyReader::ReadBody(const Block& block, const YamlEntry& entry) {
     yaml.Error(entry, fmt::format("{}: a body '{}' is there already", path, body.name));
     return;
   }
-  const YamlMap map(
-      &yaml, entry.value.get(), path,
-      {"mass", "com", "com_mm", "inertia", "gravity_compensation", "frames", "shapes", "beams"});
-  ReadMass(block, map, &body);
-  const int index = static_cast<int>(bodies_.bodies.size());
+  const auto index = bodies_.bodies.size();
   bodies_.places.push_back({.place = PlaceOf(entry),
                             .path = path,
                             .note = block.is_model() ? "" : fmt::format(" (body {})", body.name)});
   bodies_.bodies.push_back(std::move(body));
-  if (const YamlNode* frames = map.Find("frames")) {
-    frames_.Read(block, *frames, map.PathOf("frames"), index);
-  }
+  auto read = values_.Item<Body>(block, *entry.value, [&] {
+    const YamlMap map(
+        &yaml, entry.value.get(), path,
+        {"mass", "com", "com_mm", "inertia", "gravity_compensation", "frames", "shapes", "beams"});
+    ReadMass(block, map, &bodies_.bodies[index]);
+    if (const YamlNode* frames = map.Find("frames")) {
+      frames_.Read(block, *frames, map.PathOf("frames"), static_cast<int>(index));
+    }
+    return std::optional(bodies_.bodies[index]);
+  });
+  bodies_.bodies[index] = *std::move(read);
 }
 
 void BodyReader::ReadMass(const Block& block, const YamlMap& map, Body* body) {
@@ -167,8 +173,9 @@ void ShapeReader::ReadList(const Block& block, const YamlNode& node, const std::
   for (size_t i = 0; i < items->size(); ++i) {
     const YamlNode& item = *(*items)[i];
     if (!HasRoom(item, shapes.size(), kMaxItems, "shapes on one body", &yaml)) return;
-    const auto shape = ReadShape(block, item, fmt::format("{}[{}]", path, i), body);
-    if (shape) shapes.push_back(*shape);
+    auto shape = values_.Item<Shape>(
+        block, item, [&] { return ReadShape(block, item, fmt::format("{}[{}]", path, i), body); });
+    if (shape) shapes.push_back(*std::move(shape));
   }
 }
 

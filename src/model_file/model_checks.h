@@ -65,6 +65,10 @@ class ModelReport {
   [[nodiscard]] bool has_errors() const { return yaml_.has_errors() || others_.has_errors(); }
   /// Of these, findings with a place in the model file, or about it.
   [[nodiscard]] bool has_own_errors() const { return yaml_.has_errors(); }
+  /// How many there are, caveats included.
+  [[nodiscard]] size_t findings() const {
+    return yaml_.diagnostics().findings().size() + others_.findings().size() + caveats_.size();
+  }
 
  private:
   const ModelPlaces& places_;

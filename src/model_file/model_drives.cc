@@ -443,6 +443,7 @@ void ExpandLeg(const Block& block, const YamlEntry& entry, ModelValues* values,
   blocks->made.push_back(part);
   Block leg = block;
   leg.node = part.get();
+  leg.written = false;
   leg.path = map.path();
   leg.prefix = block.prefix + entry.key + ".";
   leg.levels.insert(leg.levels.begin(), leg.prefix);

@@ -27,8 +27,10 @@ std::set<std::string> KeysOf(const YamlNode* map) {
 void ParameterReader::ReadModel(const Block& model, const YamlMap& file) {
   std::error_code ignored;
   std::deque<File> files;  // innermost base first
-  OpenFiles(&yaml_, *file.node(),
-            {std::filesystem::weakly_canonical(yaml_.file(), ignored).string()}, &files);
+  if (file.Has("parameters_from")) {
+    OpenFiles(&yaml_, *file.node(),
+              {std::filesystem::weakly_canonical(yaml_.file(), ignored).string()}, &files);
+  }
   struct Source {
     YamlReader* yaml;
     const YamlNode* node;
@@ -100,6 +102,10 @@ void ParameterReader::Define(YamlReader* yaml, const Block& block, const YamlNod
                              const std::string& path) {
   if (node == nullptr) return;
   for (const YamlEntry& entry : yaml->Entries(*node, path)) {
+    if (const ParameterText* known = Known(entry)) {
+      block.scope->Define(entry.key, known->value->text, known->in_unit);
+      continue;
+    }
     const std::string where = JoinPath(path, entry.key);
     if (const std::string why = InvalidNameReason(entry.key); !why.empty()) {
       yaml->Error(entry, fmt::format("{}: bad parameter name '{}'", path, entry.key), why);
@@ -132,35 +138,60 @@ void ParameterReader::Evaluate(YamlReader* yaml, const Block& block, const YamlN
   if (node == nullptr || !node->is_map()) return;
   for (const YamlEntry& entry : node->entries) {
     if (!block.scope->Has(entry.key) || replaced.count(entry.key) > 0) continue;
-    const std::string where = JoinPath(path, entry.key);
-    Parameter parameter{.name = block.prefix + entry.key, .unit = "", .note = ""};
     const ExpressionResult result = block.scope->Lookup(entry.key);
-    if (result.value) parameter.value = *result.value;
-    const YamlNode* at = entry.value.get();
-    if (at->is_map()) {
-      const YamlMap map(yaml, at, where,
-                        {"value", "value_deg", "value_mm", "unit", "source", "note"});
-      if (const auto found = map.FindInUnit("value", {kPlain, kDeg, kMm}); found.node != nullptr) {
-        at = found.node;
-      }
-      if (const YamlNode* unit = map.Find("unit")) {
-        parameter.unit = yaml->Text(*unit, map.PathOf("unit")).value_or("");
-      }
-      if (const YamlNode* note = map.Find("note")) {
-        parameter.note = yaml->Text(*note, map.PathOf("note")).value_or("");
-      }
-      if (const YamlNode* source = map.Find("source")) {
-        const auto choice =
-            yaml->Choice(*source, map.PathOf("source"), {"printed", "assumed", "corrected"});
-        if (choice) parameter.source = SourceOf(*choice);
-      }
-    }
+    const size_t findings = yaml->diagnostics().findings().size();
+    const ParameterText* known = Known(entry);
+    const ParameterText text = known != nullptr ? *known : ReadText(yaml, entry, path);
     if (!result.value && !result.error.empty()) {
-      yaml->Error(*at, fmt::format("{} = {} {}", where, Describe(*at), result.error), result.hint);
+      yaml->Error(
+          *text.value,
+          fmt::format("{} = {} {}", JoinPath(path, entry.key), Describe(*text.value), result.error),
+          result.hint);
     }
-    parameter.written_out = IsWrittenOut(at->text) && !Contains(block.given, entry.key);
-    parameters_.push_back(std::move(parameter));
+    parameters_.push_back({.name = block.prefix + entry.key,
+                           .value = result.value.value_or(kNan),
+                           .unit = text.unit,
+                           .source = text.source,
+                           .note = text.note,
+                           .written_out = text.written_out && !Contains(block.given, entry.key)});
+    const bool good = yaml->diagnostics().findings().size() == findings;
+    if (known == nullptr && good && known_texts_ != nullptr && yaml == &yaml_) {
+      known_texts_->emplace(&entry, text);
+    }
   }
+}
+
+// Of a file whose tree is not kept nothing is known.
+const ParameterText* ParameterReader::Known(const YamlEntry& entry) const {
+  if (known_texts_ == nullptr) return nullptr;
+  const auto found = known_texts_->find(&entry);
+  return found == known_texts_->end() ? nullptr : &found->second;
+}
+
+ParameterText ParameterReader::ReadText(YamlReader* yaml, const YamlEntry& entry,
+                                        const std::string& path) {
+  ParameterText text{.value = entry.value.get(), .unit = "", .note = ""};
+  if (entry.value->is_map()) {
+    const YamlMap map(yaml, entry.value.get(), JoinPath(path, entry.key),
+                      {"value", "value_deg", "value_mm", "unit", "source", "note"});
+    if (const auto found = map.FindInUnit("value", {kPlain, kDeg, kMm}); found.node != nullptr) {
+      text.value = found.node;
+      text.in_unit = found.unit;
+    }
+    if (const YamlNode* unit = map.Find("unit")) {
+      text.unit = yaml->Text(*unit, map.PathOf("unit")).value_or("");
+    }
+    if (const YamlNode* note = map.Find("note")) {
+      text.note = yaml->Text(*note, map.PathOf("note")).value_or("");
+    }
+    if (const YamlNode* source = map.Find("source")) {
+      const auto choice =
+          yaml->Choice(*source, map.PathOf("source"), {"printed", "assumed", "corrected"});
+      if (choice) text.source = SourceOf(*choice);
+    }
+  }
+  text.written_out = IsWrittenOut(text.value->text);
+  return text;
 }
 
 void ParameterReader::Override(const Block& block) {
@@ -179,9 +210,7 @@ void ParameterReader::Override(const Block& block) {
       others_.Add(finding);
     }
   }
-  for (const std::string& name : block.scope->Names()) {
-    if (block.scope->Has(name)) known_.push_back(block.prefix + name);
-  }
+  scopes_.emplace_back(block.scope, block.prefix);
 }
 
 Finding ParameterReader::PlaceOfOverride(const std::string& name) const {
@@ -201,7 +230,13 @@ void ParameterReader::CheckOverrides() {
       finding.message = fmt::format("parameter {} = {} {}", name, value, why);
     } else {
       finding.message = fmt::format("{} has no parameter '{}'", yaml_.file(), name);
-      finding.hint = DidYouMean(name, known_);
+      std::vector<std::string> known;  // dotted names
+      for (const auto& [scope, prefix] : scopes_) {
+        for (const std::string& own : scope->Names()) {
+          if (scope->Has(own)) known.push_back(prefix + own);
+        }
+      }
+      finding.hint = DidYouMean(name, known);
     }
     others_.Add(finding);
   }

@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 #include <string>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "base/diagnostics.h"
@@ -19,12 +21,25 @@
 
 namespace mbv::internal {
 
+/// What a file says of a parameter beside its value, for later loads of the same document.
+struct ParameterText {
+  const YamlNode* value = nullptr;
+  UnitSuffix in_unit = kPlain;
+  std::string unit, note;
+  Source source = Source::kUnstated;
+  bool written_out = false;
+};
+/// By the entry in the document's tree; of those without findings.
+using ParameterTexts = std::unordered_map<const YamlEntry*, ParameterText>;
+
 /// Reads parameters into the scopes of blocks, and lists them.
 class ParameterReader {
  public:
-  /// `others`: findings that have no place in the model file.
-  ParameterReader(const LoadOptions& options, YamlReader* yaml, Diagnostics* others)
-      : options_(options), yaml_(*yaml), others_(*others) {}
+  /// `others`: findings that have no place in the model file. `known`: texts of the model file that
+  /// an earlier load read; null: none is.
+  ParameterReader(const LoadOptions& options, YamlReader* yaml, Diagnostics* others,
+                  ParameterTexts* known)
+      : options_(options), yaml_(*yaml), others_(*others), known_texts_(known) {}
 
   /// The model's own parameters after those of the files it takes them from; the nearer file wins.
   /// `file`: the whole model file.
@@ -46,11 +61,12 @@ class ParameterReader {
   };
   void OpenFiles(YamlReader* yaml, const YamlNode& root, const std::vector<std::string>& chain,
                  std::deque<File>* files);
-  static void Define(YamlReader* yaml, const Block& block, const YamlNode* node,
-                     const std::string& path);
+  [[nodiscard]] const ParameterText* Known(const YamlEntry& entry) const;
+  void Define(YamlReader* yaml, const Block& block, const YamlNode* node, const std::string& path);
   void Override(const Block& block);
   void Evaluate(YamlReader* yaml, const Block& block, const YamlNode* node, const std::string& path,
                 const std::set<std::string>& replaced = {});
+  static ParameterText ReadText(YamlReader* yaml, const YamlEntry& entry, const std::string& path);
   [[nodiscard]] Finding PlaceOfOverride(const std::string& name) const;
 
   const LoadOptions& options_;
@@ -59,7 +75,8 @@ class ParameterReader {
   std::vector<Parameter> parameters_;
   std::map<std::string, std::string> overridden_;  // full name of a parameter → name as given
   std::set<std::string> used_overrides_;           // names as given
-  std::vector<std::string> known_;                 // dotted names, for "did you mean"
+  std::vector<std::pair<const Scope*, std::string>> scopes_;  // that take overrides, their prefixes
+  ParameterTexts* known_texts_;
 };
 
 /// Adds a block for each instance of a part, those within parts included.

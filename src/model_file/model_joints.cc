@@ -58,12 +58,13 @@ void ReadScrewGuess(const Block& block, const YamlMap& map, const YamlMap::InUni
 
 // More than a turn is not a guess; degrees are.
 void WarnAboutGuess(const YamlNode& node, const std::string& path, const UnitSuffix& unit,
-                    const Joint& joint, int k, YamlReader* yaml) {
+                    const Joint& joint, int k, ModelValues* values) {
   const double guess = joint.guess[static_cast<size_t>(k)];
   if (IsLength(joint.kind, k) || unit.suffix == kDeg.suffix) return;
   if (std::abs(guess) <= 2.0 * std::numbers::pi) return;
-  yaml->Warn(node, fmt::format("{} = {:.6g} rad is more than a turn", path, guess),
-             "angles are in radians; write guess_deg for degrees");
+  values->UseUnknown();
+  values->yaml().Warn(node, fmt::format("{} = {:.6g} rad is more than a turn", path, guess),
+                      "angles are in radians; write guess_deg for degrees");
 }
 
 // Whether the joint is to be cut.
@@ -81,7 +82,18 @@ void ModelJoints::Add(Joint joint, Place place, std::optional<bool> hint) {
 }
 
 void JointReader::Read(const Block& block) {
-  for (const YamlEntry& entry : block.Entries("joints", &values_.yaml())) ReadJoint(block, entry);
+  for (const YamlEntry& entry : block.Entries("joints", &values_.yaml())) {
+    auto read =
+        values_.Item<JointRead>(block, *entry.value, [&] { return ReadJoint(block, entry); });
+    if (read) AddJoint(*std::move(read), PlaceOf(entry));
+  }
+}
+
+void JointReader::AddJoint(JointRead read, Place place) {
+  const size_t index = joints_.joints.size();
+  if (read.guessed) joints_.guessed.insert(static_cast<int>(index));
+  if (read.lead) joints_.screws.push_back(ScrewOf(read.joint.name, index, *read.lead));
+  joints_.Add(std::move(read.joint), place, read.hint);
 }
 
 // Neither one too many, nor there already.
@@ -94,7 +106,8 @@ bool JointReader::IsFresh(const YamlEntry& entry, const std::string& path,
   return false;
 }
 
-void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
+std::optional<JointReader::JointRead> JointReader::ReadJoint(const Block& block,
+                                                             const YamlEntry& entry) {
   YamlReader& yaml = values_.yaml();
   const std::string path = JoinPath(block.PathOf("joints"), entry.key);
   const bool good_before = joints_.good;
@@ -102,11 +115,13 @@ void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   Joint joint;
   joint.name = block.prefix + entry.key;
   joints_.refused.insert(joint.name);
-  if (!IsNewName(entry, block.PathOf("joints"), &yaml) || !IsFresh(entry, path, joint.name)) return;
+  if (!IsNewName(entry, block.PathOf("joints"), &yaml) || !IsFresh(entry, path, joint.name)) {
+    return std::nullopt;
+  }
   const YamlMap map(&yaml, entry.value.get(), path, kJointKeys);
   if (entry.value->is_null()) {
     yaml.Error(entry, fmt::format("{}: the joint is not described", path));
-    return;
+    return std::nullopt;
   }
   const YamlNode* kind = map.Required("kind");
   const YamlNode* parent = map.Required("parent");
@@ -130,17 +145,16 @@ void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
     good = false;
   }
   joints_.good = good_before && good;
-  if (!good) return;
+  if (!good) return std::nullopt;
   joint.parent = on_parent->body;
   joint.X_PF = on_parent->X_BF;
   joint.child = on_child->body;
   joint.X_CM = on_child->X_BF;
   joints_.refused.erase(joint.name);
-  if (map.Has("guess") || map.Has("guess_deg") || map.Has("guess_mm")) {
-    joints_.guessed.insert(static_cast<int>(joints_.joints.size()));
-  }
-  if (lead) joints_.screws.push_back(ScrewOf(joint.name, joints_.joints.size(), *lead));
-  joints_.Add(std::move(joint), PlaceOf(entry), HintOf(map, &yaml));
+  return JointRead{.joint = std::move(joint),
+                   .lead = lead,
+                   .hint = HintOf(map, &yaml),
+                   .guessed = map.Has("guess") || map.Has("guess_deg") || map.Has("guess_mm")};
 }
 
 // What depends on the kind.
@@ -261,7 +275,7 @@ void ReadGuess(const Block& block, const YamlNode& node, const std::string& path
   const int n = DofsOf(joint->kind);
   if (n == 1 && node.is_scalar()) {
     joint->guess[0] = values->Number(block, node, path, UnitOf(unit, joint->kind, 0)).value_or(0.0);
-    WarnAboutGuess(node, path, unit, *joint, 0, &values->yaml());
+    WarnAboutGuess(node, path, unit, *joint, 0, values);
     return;
   }
   const auto items = values->yaml().Items(node, path, n);
@@ -271,7 +285,7 @@ void ReadGuess(const Block& block, const YamlNode& node, const std::string& path
                           ->Number(block, *(*items)[k], fmt::format("{}[{}]", path, k),
                                    UnitOf(unit, joint->kind, k))
                           .value_or(0.0);
-    WarnAboutGuess(*(*items)[k], fmt::format("{}[{}]", path, k), unit, *joint, k, &values->yaml());
+    WarnAboutGuess(*(*items)[k], fmt::format("{}[{}]", path, k), unit, *joint, k, values);
   }
 }
 

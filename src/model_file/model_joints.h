@@ -36,7 +36,15 @@ class JointReader {
   void Read(const Block& block);
 
  private:
-  void ReadJoint(const Block& block, const YamlEntry& entry);
+  // Empty after a finding.
+  struct JointRead {
+    Joint joint;
+    std::optional<double> lead;  // of a helical joint [m per turn]
+    std::optional<bool> hint;
+    bool guessed = false;
+  };
+  std::optional<JointRead> ReadJoint(const Block& block, const YamlEntry& entry);
+  void AddJoint(JointRead read, Place place);
   [[nodiscard]] bool IsFresh(const YamlEntry& entry, const std::string& path,
                              const std::string& name);
   bool ReadCoordinates(const Block& block, const YamlMap& map, std::optional<double> lead,

@@ -56,7 +56,9 @@ std::optional<Pose> BodyNames::FrameOn(const Block& block, int body,
                                        const std::string& name) const {
   for (const std::string& level : block.levels) {
     const NamedFrame* frame = bodies_.FindFrame(body, level + name);
-    if (frame != nullptr) return frame->X_BF;
+    if (frame == nullptr) continue;
+    values_.UseFrame(body, *frame);
+    return frame->X_BF;
   }
   return std::nullopt;
 }
@@ -83,7 +85,10 @@ std::optional<FrameRef> BodyNames::Frame(const Block& block, const YamlNode& nod
       if (dot == 0) break;
     }
   }
-  if (const auto link = bodies_.links.find(*name); link != bodies_.links.end()) return link->second;
+  if (const auto link = bodies_.links.find(*name); link != bodies_.links.end()) {
+    values_.UseUnknown();
+    return link->second;
+  }
   if (body_without_frame >= 0) {
     const mbv::Body& body = bodies_.bodies[body_without_frame];
     values_.yaml().Error(node,

@@ -2,11 +2,108 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <bit>
+#include <cctype>
 #include <cmath>
+#include <cstdint>
 
 #include "math/spatial.h"
 
 namespace mbv::internal {
+namespace {
+
+bool SameBits(double a, double b) {  // zeros with their signs
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+}  // namespace
+
+void ItemMemory::Begin(const std::vector<Parameter>& parameters, const std::vector<Body>& bodies) {
+  bodies_ = &bodies;
+  next_ = 0;
+  reading_ = false;
+  bool same = parameters.size() == values_.size();
+  changed_.assign(parameters.size(), false);
+  for (size_t k = 0; k < parameters.size() && same; ++k) {
+    const auto at = places_.find(parameters[k].name);
+    same = at != places_.end() && at->second == k;
+    changed_[k] = same && !SameBits(parameters[k].value, values_[k]);
+  }
+  if (!same) items_.clear(), places_.clear();
+  values_.clear();
+  for (const Parameter& parameter : parameters) {
+    if (!same) places_.emplace(parameter.name, values_.size());
+    values_.push_back(parameter.value);
+  }
+}
+
+bool ItemMemory::Next(const Block& block, const YamlNode& node) {
+  if (reading_ || !block.written) return false;
+  if (next_ == items_.size()) items_.emplace_back();
+  Item& item = items_[next_++];
+  if (item.node == &node && item.prefix == block.prefix) return true;
+  item = {.node = &node, .prefix = block.prefix};
+  return true;
+}
+
+const std::any* ItemMemory::Known(Literals* literals) const {
+  const Item& item = items_[next_ - 1];
+  if (!item.made.has_value()) return nullptr;
+  for (const size_t parameter : item.parameters) {
+    if (changed_[parameter]) return nullptr;
+  }
+  for (const FrameUse& use : item.frames) {
+    const auto& frames = (*bodies_)[static_cast<size_t>(use.body)].frames;
+    if (use.frame >= frames.size()) return nullptr;
+    const Pose& now = frames[use.frame].X_BF;
+    if (!std::equal(now.data(), now.data() + 16, use.X_BF.data(), SameBits)) return nullptr;
+  }
+  for (const Literal& literal : item.literals) (void)literals->At(literal.place, literal.value);
+  return &item.made;
+}
+
+void ItemMemory::Record() {
+  Item& item = items_[next_ - 1];
+  item = {.node = item.node, .prefix = item.prefix};
+  reading_ = keeps_ = true;
+}
+
+// Whatever looks like a name: those that are none name no parameter.
+void ItemMemory::AddParametersOf(const std::string& expression,
+                                 const std::vector<std::string>& levels) {
+  if (!reading_) return;
+  const auto is_part = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+  };
+  std::vector<size_t>& uses = items_[next_ - 1].parameters;
+  for (auto from = expression.begin(); from != expression.end();) {
+    const auto end = std::find_if_not(from, expression.end(), is_part);
+    for (const std::string& level : levels) {
+      if (from == end) break;
+      const auto at = places_.find(level + std::string(from, end));
+      if (at == places_.end()) continue;
+      if (std::ranges::find(uses, at->second) == uses.end()) uses.push_back(at->second);
+      break;
+    }
+    from = std::find_if(end, expression.end(), is_part);
+  }
+}
+
+void ItemMemory::AddFrame(int body, const NamedFrame& frame) {
+  if (!reading_) return;
+  const auto& frames = (*bodies_)[static_cast<size_t>(body)].frames;
+  items_[next_ - 1].frames.push_back(
+      {body, static_cast<size_t>(&frame - frames.data()), frame.X_BF});
+}
+
+void ItemMemory::AddLiteral(Literal literal) {
+  if (reading_) items_[next_ - 1].literals.push_back(std::move(literal));
+}
+
+void ItemMemory::Keep(std::any made) {
+  reading_ = false;
+  if (keeps_) items_[next_ - 1].made = std::move(made);
+}
 
 double Literals::At(const std::string& place, double value) {
   // An instance's literal is read once, its part's as often as there are instances.
@@ -26,7 +123,13 @@ std::optional<double> ModelValues::NumberAt(const Block& block, const YamlNode& 
   const ExpressionResult result = block.scope->Evaluate(node.text);
   if (result.value) {
     const double value = unit.to_si(*result.value);
-    return IsWrittenOut(node.text) ? literals_.At(path(), value) : value;
+    if (!IsWrittenOut(node.text)) {
+      if (memory_ != nullptr) memory_->AddParametersOf(node.text, block.levels);
+      return value;
+    }
+    const std::string place = path();
+    if (memory_ != nullptr) memory_->AddLiteral({place, value});
+    return literals_.At(place, value);
   }
   // An empty text: a parameter failed whose own place already carries the finding.
   if (!result.error.empty()) {

@@ -1,6 +1,7 @@
 // Numbers, vectors, axes and poses of a model file. Internal to the model loader.
 #pragma once
 
+#include <any>
 #include <deque>
 #include <initializer_list>
 #include <map>
@@ -38,6 +39,7 @@ struct Block {
   std::vector<std::string> levels;  ///< prefixes in which a name is looked up, inner first
   std::vector<std::string> parts;   ///< names of the parts around, to find endless nesting
   std::vector<std::string> given;   ///< parameters that the instance sets
+  bool written = true;              ///< `node` is in the file, not made of it
 
   [[nodiscard]] bool is_model() const { return prefix.empty(); }
   [[nodiscard]] const YamlNode* Section(std::string_view key) const;
@@ -71,6 +73,54 @@ class Literals {
   const std::map<std::string, double>& replaced_;
   std::vector<Literal> literals_;
   std::set<std::string> places_;
+};
+
+/// What readers made of items of a model file (a body, a frame, a joint, a shape). At later loads
+/// of the same document they are taken again where all numbers and frames that they were made of
+/// are what they were. Items with findings are read each time.
+class ItemMemory {
+ public:
+  /// Before the items of a load are read. Where its parameters are not those of the load before,
+  /// but for their values, nothing is known. `bodies` outlive the load.
+  void Begin(const std::vector<Parameter>& parameters, const std::vector<Body>& bodies);
+
+  /// The next item of the load; false where it is not kept: a part of another item, or of a block
+  /// that no file contains.
+  bool Next(const Block& block, const YamlNode& node);
+  /// What is known of it; null where it must be read.
+  [[nodiscard]] const std::any* Known(Literals* literals) const;
+
+  /// While it is read: what it is made of.
+  void Record();
+  void AddParametersOf(const std::string& expression, const std::vector<std::string>& levels);
+  void AddFrame(int body, const NamedFrame& frame);
+  void AddLiteral(Literal literal);
+  void AddUnknown() { keeps_ = false; }
+  /// What was read; nothing where it cannot be taken again.
+  void Keep(std::any made);
+
+ private:
+  struct FrameUse {
+    int body = 0;
+    size_t frame = 0;
+    Pose X_BF = Pose::Identity();
+  };
+  struct Item {
+    const YamlNode* node = nullptr;
+    std::string prefix = {};
+    std::vector<size_t> parameters = {};
+    std::vector<FrameUse> frames = {};
+    std::vector<Literal> literals = {};
+    std::any made = {};  // empty: to be read
+  };
+
+  std::map<std::string, size_t> places_;  // of parameters
+  std::vector<double> values_;
+  std::vector<bool> changed_;
+  std::vector<Item> items_;  // in the order of reading
+  size_t next_ = 0;
+  bool reading_ = false, keeps_ = false;
+  const std::vector<Body>* bodies_ = nullptr;
 };
 
 /// Reads one value each, in the scope of a block; empty after a finding. Keys may carry a unit.
@@ -112,6 +162,28 @@ class ModelValues {
 
   [[nodiscard]] YamlReader& yaml() { return yaml_; }
 
+  /// Takes items again that `memory` knows.
+  void Remember(ItemMemory* memory) { memory_ = memory; }
+  /// What `make` reads of an item, or made of it at an earlier load.
+  template <typename Made, typename Make>
+  std::optional<Made> Item(const Block& block, const YamlNode& node, const Make& make) {
+    if (memory_ == nullptr || !memory_->Next(block, node)) return make();
+    if (const std::any* known = memory_->Known(&literals_)) return *std::any_cast<Made>(known);
+    const size_t findings = yaml_.diagnostics().findings().size();
+    memory_->Record();
+    std::optional<Made> made = make();
+    const bool good = made && yaml_.diagnostics().findings().size() == findings;
+    memory_->Keep(good ? std::any(*made) : std::any());
+    return made;
+  }
+  /// The item that is read uses this frame, or has what is not to be taken again.
+  void UseFrame(int body, const NamedFrame& frame) {
+    if (memory_ != nullptr) memory_->AddFrame(body, frame);
+  }
+  void UseUnknown() {
+    if (memory_ != nullptr) memory_->AddUnknown();
+  }
+
  private:
   /// `path` gives the text where it is needed: in findings and of literals.
   template <typename PathOf>
@@ -125,6 +197,7 @@ class ModelValues {
 
   YamlReader& yaml_;
   Literals& literals_;
+  ItemMemory* memory_ = nullptr;
 };
 
 // The names by which scenarios command and watch a model: of drives, prescribed joints, outputs and

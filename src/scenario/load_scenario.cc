@@ -20,6 +20,7 @@
 #include "mechanism/channels.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/motion.h"
+#include "mechanism/same_geometry.h"
 #include "model_file/load_model.h"
 #include "model_file/yaml/value_reader.h"
 #include "scenario/file_parts.h"
@@ -948,13 +949,19 @@ LoadResult ScenarioMemory::Load(const std::string& model_file, const LoadOptions
                     options_.gravity_W == options.gravity_W &&
                     options_.holding == options.holding && options_.guesses == options.guesses;
   if (same) return model_;
-  rank_.reset();
   const auto known = texts_.find(model_file);
   const auto& text = known != texts_.end() ? known->second
                                            : texts_[model_file] = YamlReader(model_file).ReadFile();
+  LoadResult model =
+      text ? LoadModelText(*text, model_file, options) : LoadModel(model_file, options);
+  const bool ranks_stay = rank_ && model.mechanism && model_.mechanism &&
+                          model_file_ == model_file &&
+                          HaveSameGeometry(*model.mechanism, *model_.mechanism) &&
+                          HaveSameSpins(*model.mechanism, *model_.mechanism);
+  if (!ranks_stay) rank_.reset();
   model_file_ = model_file;
   options_ = options;
-  model_ = text ? LoadModelText(*text, model_file, options) : LoadModel(model_file, options);
+  model_ = std::move(model);
   return model_;
 }
 

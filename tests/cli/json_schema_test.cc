@@ -42,7 +42,7 @@ constexpr Call kCalls[] = {
     {"run OUT/servo.xml --no-pictures --no-report --out OUT/x", 0},
     {"stiffness scara_robot --out OUT/x", 0},
     {"converge four_bar/turn --out OUT/x", 0},
-    {"study four_bar/study_by_hand --out OUT/x", 0},
+    {"study four_bar/study_by_hand --count 16 --out OUT/x", 0},
     {"study four_bar/study_validation --out OUT/x", 0},
     {"sensitivity four_bar/turn_inverse --parameter rho", 0},
     {"sensitivity four_bar/static --no-search --out OUT/x", 0},
@@ -70,7 +70,7 @@ constexpr Call kCalls[] = {
      "--range ankle.0_deg=-2:2 --range ankle.1_deg=-2:2 --export --out OUT/y",
      0},
     {"code tests/mechanisms/parallel_ankle.yaml --coordinates ankle.0,ankle.1 --states 20 "
-     "--range ankle.0_deg=-2:2 --range ankle.1_deg=-2:2 --out OUT/x",
+     "--range ankle.0_deg=-2:2 --range ankle.1_deg=-2:2 --cells 8 --out OUT/x",
      0},
     {"standin tests/mechanisms/parallel_ankle.yaml --joints ankle.0,ankle.1 --resolution 3 "
      "--out OUT/x",

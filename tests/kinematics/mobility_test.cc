@@ -372,5 +372,65 @@ TEST(FindRank, HoldsWhereDivideAndConquerFails) {
   }
 }
 
+// In the coordinates of the spanning tree as by all rows, of all shipped models: with their drives
+// locked one after the other, and with one row that nothing else holds or that is there twice.
+TEST(Ranks, InTheTreeAreThoseOfAllRows) {
+  int large = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(kSourceDir) + "/models")) {
+    const std::string file = (entry.path() / "model.yaml").string();
+    if (!std::filesystem::exists(file)) continue;
+    const LoadResult loaded = LoadModel(file);
+    ASSERT_TRUE(loaded.mechanism) << file;
+    const Mechanism& m = *loaded.mechanism;
+    BodyStates home;
+    home.Resize(m.bodies.size());
+    home.X_WB = m.X_WB_home;
+    for (const bool reactions : {false, true}) {
+      internal::RowStack rows(m.bodies.size(), CharacteristicLength(m));
+      rows.AddJoints(m, home, reactions);
+      const int held = rows.size();
+      rows.AddDriven(m, home);
+      for (const Joint& joint : m.joints) {
+        if (!joint.closure) continue;
+        const ConstraintRows twice = RowsOf(joint, home, false);
+        rows.Add(twice);
+        break;
+      }
+      const internal::NestedRanks all = internal::RanksOf(rows.Matrix(), held);
+      const internal::NestedRanks tree = internal::RanksInTree(rows, m, home, held);
+      EXPECT_EQ(tree.first, all.first) << file;
+      EXPECT_EQ(tree.all, all.all) << file;
+      large += rows.Matrix().cols() > 48 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(large, 10);
+}
+
+// At poses that the tree's joints do not fit, all rows count.
+TEST(Ranks, OfPosesThatDoNotFitAreThoseOfAllRows) {
+  const LoadResult loaded =
+      LoadModel(std::string(kSourceDir) + "/models/stabilizing_platform/model.yaml");
+  ASSERT_TRUE(loaded.mechanism);
+  const Mechanism& m = *loaded.mechanism;
+  BodyStates moved;
+  moved.Resize(m.bodies.size());
+  moved.X_WB = m.X_WB_home;
+  std::mt19937_64 random(4);  // NOLINT(cert-msc51-cpp): the same each time
+  std::uniform_real_distribution<double> one(-0.01, 0.01);
+  for (size_t b = 1; b < moved.X_WB.size(); ++b) {
+    moved.X_WB[b].rotate(Eigen::AngleAxisd(one(random), Vec3::UnitX()));
+  }
+  internal::RowStack rows(m.bodies.size(), CharacteristicLength(m));
+  rows.AddJoints(m, moved, false);
+  const internal::NestedRanks all = internal::RanksOf(rows.Matrix(), rows.size());
+  EXPECT_EQ(internal::RanksInTree(rows, m, moved, rows.size()).all, all.all);
+  rows = internal::RowStack(m.bodies.size(), CharacteristicLength(m));
+  BodyStates home = moved;
+  home.X_WB = m.X_WB_home;
+  rows.AddJoints(m, home, false);
+  EXPECT_NE(internal::RanksInTree(rows, m, home, rows.size()).all, all.all);
+}
+
 }  // namespace
 }  // namespace mbv

@@ -69,7 +69,7 @@ class CodeMaker {
     result_.files = {{result_.name + ".h", header},
                      {result_.name + ".py", python},
                      {result_.name + "_test.c", CheckProgram(*formulas_, options_)}};
-    if (options_.table) AddLookup();
+    if (options_.table && settings_.check.empty()) AddLookup();
     if (settings_.compile) Judge(header, python);
     return std::move(result_);
   }
@@ -204,13 +204,17 @@ class CodeMaker {
 
   bool MakeTable() {
     std::string why;
-    options_.table = MakeStartTable(*formulas_, spread_.low, spread_.high, settings_.cells, &why,
-                                    [this](double share) { Report(0.4 + 0.4 * share); });
+    options_.table =
+        settings_.table != nullptr
+            ? *settings_.table
+            : MakeStartTable(*formulas_, spread_.low, spread_.high, settings_.cells, &why,
+                             [this](double share) { Report(0.4 + 0.4 * share); });
     if (!why.empty()) {
       result_.diagnostics.AddError(m_.file, "no table that is proved: " + why,
                                    "without ranges, code starts from the pose at hand");
       return false;
     }
+    result_.table = options_.table;
     size_t proved = 0;
     for (const bool cell : options_.table->proved) proved += cell ? 1 : 0;
     result_.table_bound = options_.table->bound;

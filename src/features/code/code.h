@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -26,7 +27,8 @@ struct CodeSettings {
   std::string name = {};               ///< before all names in C; "": of the mechanism
   std::vector<CodeRange> ranges = {};  ///< of all coordinates: with a table to start from
   int cells = 0;  ///< of the table per coordinate, a power of 2; 0: 512, 64 or 16 by their number
-  size_t states = 10000;  ///< that it is judged by
+  const StartTable* table = nullptr;  ///< of these ranges and cells, made before; null: it is made
+  size_t states = 10000;              ///< that it is judged by
   std::uint64_t seed = 1;
   std::string check = {};  ///< another header with the same functions, to be judged instead
   bool compile = true;
@@ -62,11 +64,12 @@ struct CodeResult {
   size_t blocks = 0, largest_block = 0, unknowns = 0;
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
   std::vector<CodeJudgement> judgements;
+  std::optional<StartTable> table = {};           ///< with ranges
   double table_bound = kNan, table_share = kNan;  ///< error left, share of the range that is proved
-  std::optional<LookupTable> lookup = {};
-  double lookup_share = kNan;  ///< of its cells, that are proved
-  VecX lookup_error = {};      ///< per actuator: largest that was found at the states
-  Diagnostics diagnostics;     ///< errors: there is no code
+  std::optional<LookupTable> lookup = {};         ///< with ranges, where no other header is judged
+  double lookup_share = kNan;                     ///< of its cells, that are proved
+  VecX lookup_error = {};   ///< per actuator: largest that was found at the states
+  Diagnostics diagnostics;  ///< errors: there is no code
 
   [[nodiscard]] bool agrees() const;
 };
@@ -155,7 +158,9 @@ class CodeCheck {
   /// `states`: with what the reference found there. `open`: where it found nothing.
   CodeCheck(const MechanismFormulas& formulas, const CodeTextOptions& options,
             const std::vector<TestState>& states, const std::vector<TestState>& open);
+  ~CodeCheck();
 
+  /// A header that is judged again is compiled once.
   [[nodiscard]] CodeJudgement C(const std::string& header, bool from_table);
   /// At the first states.
   [[nodiscard]] CodeJudgement Python(const std::string& module, size_t most);
@@ -174,6 +179,8 @@ class CodeCheck {
   /// `may_refuse`: the code need not reach all states.
   void Compare(CodeJudgement* judgement, bool may_refuse) const;
   [[nodiscard]] bool ClosesOtherwise(const VecX& q, const VecX& actuators) const;
+  struct Built;
+  void Build(const std::string& header);
 
   const MechanismFormulas& formulas_;
   const CodeTextOptions& options_;
@@ -181,6 +188,7 @@ class CodeCheck {
   const std::vector<TestState>& open_;
   std::vector<Found> found_;  ///< at the first `compared_` states, then at open ones
   size_t compared_ = 0;
+  std::unique_ptr<Built> built_;  ///< the last program
 };
 
 }  // namespace mbv

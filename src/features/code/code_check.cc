@@ -253,6 +253,7 @@ int main(int argc, char** argv) {
 CodeCheck::CodeCheck(const MechanismFormulas& formulas, const CodeTextOptions& options,
                      const std::vector<TestState>& states, const std::vector<TestState>& open)
     : formulas_(formulas), options_(options), states_(states), open_(open) {}
+CodeCheck::~CodeCheck() = default;
 
 std::string CodeCheck::Run(const std::vector<std::string>& argv,
                            const std::filesystem::path& folder, size_t count,
@@ -293,23 +294,31 @@ std::string CodeCheck::Run(const std::vector<std::string>& argv,
   return "";
 }
 
-CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
-  CodeJudgement judgement{.language = from_table ? "C, from the table" : "C"};
+// A program of a header, and what compiling it gave.
+struct CodeCheck::Built {
+  ScratchFolder folder{"code"};
+  std::string header;
+  CodeJudgement judgement = {};  // what holds of each of its runs
+};
+
+void CodeCheck::Build(const std::string& header) {
+  built_ = std::make_unique<Built>();
+  built_->header = header;
+  CodeJudgement& judgement = built_->judgement;
   const char* chosen = std::getenv("CC");
   const std::string called = chosen != nullptr && *chosen != '\0' ? chosen : "cc";
   const std::optional<std::string> compiler = FindProgram(called);
   if (!compiler) {
     judgement.not_judged = "there is no C compiler '" + called + "'";
-    return judgement;
+    return;
   }
-  const ScratchFolder folder("code");
-  judgement.not_judged = folder.trouble();
-  if (!judgement.not_judged.empty()) return judgement;
-  const std::filesystem::path& at = folder.path();
+  judgement.not_judged = built_->folder.trouble();
+  if (!judgement.not_judged.empty()) return;
+  const std::filesystem::path& at = built_->folder.path();
   if (!WriteFile(at / (options_.name + ".h"), header).empty() ||
       !WriteFile(at / "test.c", CheckProgram(formulas_, options_)).empty()) {
     judgement.not_judged = "temporary files cannot be written";
-    return judgement;
+    return;
   }
   const auto lines = [&] {
     std::vector<std::string> all;
@@ -328,11 +337,17 @@ CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
                                      "-Wconversion", "-pedantic", "test.c", "-o", "test", "-lm"},
                                     at);
   judgement.warnings = lines();
-  if (!trouble.empty()) {
-    judgement.not_judged = "it does not compile: the compiler " + trouble;
-    judgement.broken = true;
-    return judgement;
-  }
+  if (trouble.empty()) return;
+  judgement.not_judged = "it does not compile: the compiler " + trouble;
+  judgement.broken = true;
+}
+
+CodeJudgement CodeCheck::C(const std::string& header, bool from_table) {
+  if (built_ == nullptr || built_->header != header) Build(header);
+  CodeJudgement judgement = built_->judgement;
+  judgement.language = from_table ? "C, from the table" : "C";
+  if (!judgement.not_judged.empty()) return judgement;
+  const std::filesystem::path& at = built_->folder.path();
   std::vector<std::string> argv = {(at / "test").string(), "states", "values"};
   if (from_table) argv.emplace_back("table");
   judgement.not_judged = Run(argv, at, states_.size(), &judgement);

@@ -129,12 +129,6 @@ std::string ForEachRow(const std::string& document,
 
 }  // namespace
 
-std::vector<std::string> AccuracyHeadings() {
-  std::vector<std::string> headings = {"step"};
-  for (const AccuracyColumn& column : AccuracyColumns()) headings.emplace_back(column.heading);
-  return headings;
-}
-
 std::vector<AccuracyCell> AccuracyCells(const std::string& document) {
   std::vector<AccuracyCell> all;
   ForEachRow(document, [&](const auto& headings, const auto& cells, const std::string& line) {

@@ -26,10 +26,9 @@ struct AccuracyCell {
 [[nodiscard]] std::vector<AccuracyCell> AccuracyCells(const std::string& document);
 
 /// What stands in a cell: "1.6e-13", "2.1e-06 m", "1 ms", "inverse"; "–" where it was not measured.
-/// Empty for a heading that is not one of AccuracyHeadings() or text that is not a summary.
+/// Empty for a heading that is not known or text that is not a summary.
 [[nodiscard]] std::optional<std::string> AccuracyText(const std::string& heading,
                                                       const std::string& summary);
-[[nodiscard]] std::vector<std::string> AccuracyHeadings();
 
 /// The document with its tables filled. Rows without a summary stay as they are.
 [[nodiscard]] std::string FillAccuracyTables(const std::string& document, const SummaryOf& summary);

@@ -1,6 +1,7 @@
 #include "features/study/study_bench.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -496,6 +497,9 @@ std::string ComputePoints(const StudyBench& bench, const PointsOptions& options,
   if (trouble.empty()) trouble = forces.Open(done.force_bytes);
   if (trouble.empty() && done.csv_bytes == 0) trouble = csv.Append(PointHeader(bench.study()));
   if (!trouble.empty()) return trouble;
+  // Each point takes the memory that the one before gave back: it stays with the process.
+  mallopt(M_TRIM_THRESHOLD, 1 << 28);
+  mallopt(M_MMAP_THRESHOLD, 1 << 25);
   const std::uint64_t all = options.share.size(bench.points().count());
   const auto number = [&](size_t i) { return options.share.number(done.rows + i); };
   const auto work = [&](size_t i) {  // in a child; its time comes first

@@ -193,8 +193,11 @@ TEST_F(CodeOfAnkle, StartsFromAProvedTable) {
   }
   const std::filesystem::path file = place_.folder() / "fewer.h";
   ASSERT_EQ(WriteFile(file, fewer), "");
-  const CodeResult worse =
-      Make({.ranges = AnkleRanges(), .cells = 32, .states = 100, .check = file.string()});
+  const CodeResult worse = Make({.ranges = AnkleRanges(),
+                                 .cells = 32,
+                                 .table = &*result.table,
+                                 .states = 100,
+                                 .check = file.string()});
   ASSERT_EQ(worse.judgements.size(), 2U) << Described(worse);
   EXPECT_TRUE(worse.judgements[0].agrees());
   EXPECT_FALSE(worse.judgements[1].agrees()) << Described(worse);
@@ -217,8 +220,11 @@ TEST_F(CodeOfAnkle, TableEndsWhereTheRodsDo) {
   all.replace(from + 1, to - from - 1, bytes);
   const std::filesystem::path file = place_.folder() / "all.h";
   ASSERT_EQ(WriteFile(file, all), "");
-  const CodeResult wrong =
-      Make({.ranges = wide, .cells = 32, .states = 1000, .check = file.string()});
+  const CodeResult wrong = Make({.ranges = wide,
+                                 .cells = 32,
+                                 .table = &*result.table,
+                                 .states = 1000,
+                                 .check = file.string()});
   ASSERT_EQ(wrong.judgements.size(), 2U) << Described(wrong);
   EXPECT_TRUE(wrong.judgements[0].agrees()) << Described(wrong);
   EXPECT_FALSE(wrong.judgements[1].agrees()) << Described(wrong);

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <future>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,7 +41,31 @@ std::string Bits(const auto& numbers) {
   return text;
 }
 
-// All that a witness reads of it.
+// What `make` gives where nothing was loaded before: a thread of its own keeps no documents.
+auto Anew(const auto& make) { return std::async(std::launch::async, make).get(); }
+
+std::string TextOf(const Shape& shape) {
+  struct Text {
+    std::string operator()(const Capsule& at) const {
+      return Bits(at.p_from) + Bits(at.p_to) + Bits(std::vector{at.radius});
+    }
+    std::string operator()(const Cylinder& at) const {
+      return Bits(at.p_from) + Bits(at.p_to) + Bits(std::vector{at.radius});
+    }
+    std::string operator()(const Box& at) const {
+      return Bits(at.X_BG.matrix().reshaped()) + Bits(at.size);
+    }
+    std::string operator()(const Ball& at) const {
+      return Bits(at.p_centre) + Bits(std::vector{at.radius});
+    }
+    std::string operator()(const Mesh& at) const {
+      return at.file + Bits(at.X_BG.matrix().reshaped()) + Bits(at.scale);
+    }
+  };
+  return shape.color + std::visit(Text(), shape.geometry);
+}
+
+// All that a witness reads of it, and what pictures show.
 std::string TextOf(const ScenarioResult& loaded) {
   std::string text = loaded.diagnostics.Text();
   for (const Finding& finding : loaded.diagnostics.findings()) {
@@ -49,6 +75,16 @@ std::string TextOf(const ScenarioResult& loaded) {
   const Mechanism& mechanism = *loaded.mechanism;
   text += MechanismJson(mechanism);
   for (const Pose& X : mechanism.X_WB_home) text += Bits(X.matrix().reshaped());
+  for (const Body& body : mechanism.bodies) {
+    for (const NamedFrame& frame : body.frames) {
+      text += frame.name + Bits(frame.X_BF.matrix().reshaped());
+    }
+    for (const Shape& shape : body.shapes) text += TextOf(shape);
+  }
+  for (const Parameter& parameter : mechanism.parameters) {
+    text += fmt::format("{}={:a} {} {} {} {}\n", parameter.name, parameter.value, parameter.unit,
+                        static_cast<int>(parameter.source), parameter.note, parameter.written_out);
+  }
   for (const Joint& joint : mechanism.joints) {
     text += Bits(joint.guess) + Bits(joint.home);
     for (const CoordinateRange& range : joint.range) {
@@ -132,7 +168,7 @@ TEST_F(ScenarioMemoryTest, AnyNumbersGiveWhatLoadingAnewGives) {
             "0", "-0.0", fmt::format("{}", -number), "1e40", "2*pi", "nothing", ".nan", "{a: 1}"};
         value = pick(6) == 0 ? odd[pick(odd.size())] : fmt::format("{:.17g}", number);
       }
-      const ScenarioResult anew = LoadScenario(file, {.set = set});
+      const ScenarioResult anew = Anew([&] { return LoadScenario(file, {.set = set}); });
       const ScenarioResult again = LoadScenario(file, {.set = set}, &memory);
       std::string what = file;
       for (const auto& [key, value] : set) what += fmt::format(" --set {}={}", key, value);
@@ -169,7 +205,7 @@ TEST_F(ScenarioMemoryTest, PointsOfShippedStudiesAreThoseOfTheirCommands) {
         set.emplace_back("simulation.mode", mode);
       }
       Diagnostics found;
-      const auto prepared = Prepare(study.scenario, {.set = set}, &found);
+      const auto prepared = Anew([&] { return Prepare(study.scenario, {.set = set}, &found); });
       if (!prepared) {
         EXPECT_EQ(row.exit_code, 2) << file << ' ' << number;
         const auto error =
@@ -323,7 +359,7 @@ TEST_F(ScenarioMemoryTest, KeptPointsAreThoseOfTheirCommands) {
         set.emplace_back(study.factors[f].key, fmt::format("{:.17g}", row.varied[f]));
       }
       Diagnostics found;
-      const auto prepared = Prepare(study.scenario, {.set = set}, &found);
+      const auto prepared = Anew([&] { return Prepare(study.scenario, {.set = set}, &found); });
       ASSERT_TRUE(prepared);
       const StudyRun run = RunStudyWitnesses(*prepared, study.witnesses);
       if (!run.failure.empty()) {
@@ -338,6 +374,139 @@ TEST_F(ScenarioMemoryTest, KeptPointsAreThoseOfTheirCommands) {
     EXPECT_GT(failed, 3);
     EXPECT_LT(failed, 60);
   }
+}
+
+// A number that is varied, by the reference alone where nothing else is said.
+struct Varied {
+  const char* what;
+  const char* scenario;
+  const char* key;
+  double least, most;
+  const char* quantity;
+  std::vector<std::string> witnesses = {"reference"};
+  bool fails = false;  // at some of the values
+};
+
+const std::vector<Varied> kVaried = {
+    {"a parameter of expressions", "stabilizing_platform/random", "parameters.r_a", 7.49, 7.51,
+     "limb1.drive.force.max"},
+    {"a mass", "stabilizing_platform/random", "parameters.m_1", 1600.0, 1800.0,
+     "limb1.drive.force.max"},
+    {"an inertia", "spr_tripod/random", "parameters.I_platform_zz", 0.5, 0.54, "leg1.force.max"},
+    {"a placement", "spr_tripod/random", "parameters.c_platform_x", -0.01, 0.01, "leg1.force.max"},
+    {"gravity in the model", "spr_tripod/random", "parameters.g", 9.7, 9.9, "leg1.force.max"},
+    {"a friction number", "friction_five_bar/draw_inverse", "parameters.dry", 0.15, 0.25,
+     "motor1.force.max"},
+    {"a number of one witness", "spr_tripod/random", "reference.parameters.m_platform", 29.0, 31.0,
+     "leg1.force.max"},
+    {"a tolerance",
+     "stabilizing_platform/random",
+     "checks.reference_force_nrmse",
+     1e-17,
+     4e-15,
+     "force_nrmse",
+     {"analytic", "reference"}},
+    {"a mass that becomes negative",
+     "spr_tripod/random",
+     "parameters.m_rod",
+     -4.0,
+     4.0,
+     "leg1.force.max",
+     {"reference"},
+     true},
+    {"a pose out of reach",
+     "stabilizing_platform/random",
+     "parameters.L3",
+     0.2,
+     2.26,
+     "limb1.drive.force.max",
+     {"reference"},
+     true},
+    {"loops that do not close",
+     "four_bar/static",
+     "parameters.coupler",
+     0.35,
+     1.5,
+     "motor.force.max",
+     {"reference"},
+     true},
+};
+
+// As a study computes it again and again, and as `mbverify run --set` does.
+TEST_F(ScenarioMemoryTest, AnyKindOfNumberGivesWhatItsCommandGives) {
+  const ParsedDocuments documents;
+  for (const Varied& varied : kVaried) {
+    SCOPED_TRACE(varied.what);
+    Study study;
+    study.name = "one";
+    study.scenario = fmt::format("scenarios/{}.yaml", varied.scenario);
+    study.factors = {{.name = varied.key,
+                      .key = varied.key,
+                      .axis = {varied.most, Uniform{varied.least, varied.most}}}};
+    study.design = {.kind = DesignKind::kSobol, .count = 16};
+    study.witnesses = varied.witnesses;
+    const std::string quantity = varied.quantity;
+    const bool check = FindMetric(quantity) != nullptr;
+    study.quantities = {{.name = quantity,
+                         .channel = check ? "" : quantity.substr(0, quantity.rfind('.')),
+                         .of_pair = check}};
+    Diagnostics diagnostics;
+    int exit_code = 0;
+    const auto bench = StudyBench::Make(study, &diagnostics, &exit_code);
+    ASSERT_TRUE(bench) << diagnostics.Text();
+    std::set<std::string> values;
+    int refused = 0;
+    for (std::uint64_t k = 0; k < 16; ++k) {
+      const PointRow row = bench->Run((k * 5) % 16).row;
+      std::vector<SetValue> set = {{varied.key, fmt::format("{:.17g}", row.varied[0])}};
+      // The reference alone has no closed form made.
+      if (varied.witnesses.size() == 1) set.emplace_back("analytic", "off");
+      Diagnostics found;
+      const auto prepared = Anew([&] { return Prepare(study.scenario, {.set = set}, &found); });
+      if (!prepared) {
+        const auto error =
+            std::ranges::find(found.findings(), Severity::kError, &Finding::severity);
+        EXPECT_EQ(row.exit_code, 2) << row.varied[0];
+        EXPECT_EQ(row.reason, error->message) << row.varied[0];
+        ++refused;
+        continue;
+      }
+      const StudyRun run = RunStudyWitnesses(*prepared, study.witnesses);
+      if (!run.failure.empty()) {
+        EXPECT_EQ(row.reason, run.failure) << row.varied[0];
+        ++refused;
+        continue;
+      }
+      const StudyMeasures measured = MeasureQuantities(run, study.quantities);
+      EXPECT_EQ(Bits(row.values), Bits(measured.values)) << row.varied[0];
+      EXPECT_EQ(row.exit_code, measured.verdict == Verdict::kDisagree ? 1 : 0) << row.varied[0];
+      values.insert(fmt::format("{} {}", Bits(row.values), row.exit_code));
+    }
+    EXPECT_GT(values.size(), 1U) << "nothing depends on it";
+    EXPECT_EQ(refused > 0, varied.fails);
+  }
+}
+
+// The last bit of each number counts: what was read of another one is not taken again.
+TEST_F(ScenarioMemoryTest, TheNextNumberIsAnotherOne) {
+  const ParsedDocuments documents;
+  const std::string file = "scenarios/stabilizing_platform/random.yaml";
+  ScenarioMemory memory;
+  const ScenarioResult nominal = LoadScenario(file, {}, &memory);
+  ASSERT_TRUE(nominal.mechanism);
+  int moved = 0;
+  for (const Parameter& parameter : nominal.mechanism->parameters) {
+    if (!parameter.written_out || parameter.value == 0.0) continue;
+    const double next = std::nextafter(parameter.value, HUGE_VAL);
+    const std::vector<SetValue> set = {
+        {"parameters." + parameter.name, fmt::format("{:.17g}", next)}};
+    const std::string again = TextOf(LoadScenario(file, {.set = set}, &memory));
+    ASSERT_EQ(again, TextOf(Anew([&] { return LoadScenario(file, {.set = set}); })))
+        << parameter.name;
+    moved += again != TextOf(nominal) ? 1 : 0;
+    ASSERT_EQ(TextOf(LoadScenario(file, {}, &memory)), TextOf(nominal)) << parameter.name;
+  }
+  EXPECT_GT(moved, 20);
 }
 
 TEST_F(ScenarioMemoryTest, PointsOfOtherMachinesAreNotKept) {
