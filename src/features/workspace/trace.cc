@@ -141,9 +141,13 @@ struct Hit {
 // nodes on a way that they follow, where it is negative, or least and zero. NaN of what does not
 // close.
 constexpr int kOfWay = 4, kOnWay = 32;
+struct Gap {
+  double at;
+  enum class Kind { kNegative, kZero, kLost } kind;  // lost: no polynomial follows the way there
+};
 template <typename Margin>
-std::optional<double> FirstGap(const Margin& margin, double a, double m_a, double b, double m_b,
-                               int halvings = kMostHalvings) {
+std::optional<Gap> FirstGap(const Margin& margin, double a, double m_a, double b, double m_b,
+                            int halvings = kMostHalvings) {
   Eigen::Matrix<double, kOfWay + 1, 1> value, c;
   value[0] = m_a;
   value[kOfWay] = m_b;
@@ -164,7 +168,7 @@ std::optional<double> FirstGap(const Margin& margin, double a, double m_a, doubl
   }
   const double off = std::abs(c[kOfWay]);
   if (!value.allFinite() || off > kSmooth * value.cwiseAbs().maxCoeff()) {
-    if (halvings == 0) return a;
+    if (halvings == 0) return Gap{a, Gap::Kind::kLost};
     const auto first = FirstGap(margin, a, m_a, middle, m, halvings - 1);
     return first ? first : FirstGap(margin, middle, m, b, m_b, halvings - 1);
   }
@@ -177,7 +181,7 @@ std::optional<double> FirstGap(const Margin& margin, double a, double m_a, doubl
             (8 * x * x * (x * x - 1) + 1) * c[4];
   }
   for (int i = 1; i <= kOnWay; ++i) {
-    if (on[i] < -zero && margin(place(i)) < -zero) return place(i);
+    if (on[i] < -zero && margin(place(i)) < -zero) return Gap{place(i), Gap::Kind::kNegative};
     if (i == kOnWay || on[i] > on[i - 1] || on[i] > on[i + 1]) continue;
     const double bend = on[i - 1] - 2.0 * on[i] + on[i + 1], slope = 0.5 * (on[i + 1] - on[i - 1]);
     if (on[i] - (bend > 0.0 ? slope * slope / (2.0 * bend) : 0.0) > 2.0 * off + kLow * on[i]) {
@@ -189,7 +193,8 @@ std::optional<double> FirstGap(const Margin& margin, double a, double m_a, doubl
           return std::isfinite(value_there) ? value_there : std::numeric_limits<double>::max();
         },
         place(i - 1), place(i + 1), 30);
-    if (least <= zero) return s;
+    if (least < -zero) return Gap{s, Gap::Kind::kNegative};
+    if (least <= zero) return Gap{s, Gap::Kind::kZero};
   }
   return std::nullopt;
 }
@@ -333,12 +338,14 @@ class Tracer {
       return space_.Step(at, s * along, &there) ? there.pose.margin[type2_] : kNan;
     };
     const auto gap = FirstGap(margin, 0.0, at.pose.margin[type2_], h, next.pose.margin[type2_]);
-    if (!gap || !space_.Step(at, *gap * along, &there)) return std::nullopt;
-    const double size = std::max(at.pose.margin[type2_], std::abs(next.pose.margin[type2_]));
-    const bool touches = std::abs(there.pose.margin[type2_]) <= kTouch * size;
-    there.pose.margin[type2_] = touches ? 0.0 : there.pose.margin[type2_];
-    if (there.pose.margin.minCoeff() < 0.0) return Exit(at, along, *gap, std::move(there));
-    if (!space_.Step(at, Bottom(margin, *gap) * along, &there)) return std::nullopt;
+    if (!gap || gap->kind == Gap::Kind::kLost) return std::nullopt;
+    if (gap->kind == Gap::Kind::kNegative) {
+      if (!space_.Step(at, gap->at * along, &there)) return std::nullopt;
+      return Exit(at, along, gap->at, std::move(there));
+    }
+    if (!space_.Step(at, Bottom(margin, gap->at) * along, &there)) return std::nullopt;
+    there.pose.margin[type2_] = 0.0;
+    if (there.pose.margin.minCoeff() < 0.0) return std::nullopt;  // another bound is before
     Vec2 slope;
     const bool twice = VanishesTwice(there, &slope);
     return Hit{std::move(there), type2_, twice ? VecX(at.N_free * along) : VecX()};
