@@ -183,8 +183,10 @@ std::optional<Gap> FirstGap(const Margin& margin, double a, double m_a, double b
   for (int i = 1; i <= kOnWay; ++i) {
     if (on[i] < -zero && margin(place(i)) < -zero) return Gap{place(i), Gap::Kind::kNegative};
     if (i == kOnWay || on[i] > on[i - 1] || on[i] > on[i + 1]) continue;
-    const double bend = on[i - 1] - 2.0 * on[i] + on[i + 1], slope = 0.5 * (on[i + 1] - on[i - 1]);
-    if (on[i] - (bend > 0.0 ? slope * slope / (2.0 * bend) : 0.0) > 2.0 * off + kLow * on[i]) {
+    const double curvature = on[i - 1] - 2.0 * on[i] + on[i + 1],
+                 slope = 0.5 * (on[i + 1] - on[i - 1]);
+    if (on[i] - (curvature > 0.0 ? slope * slope / (2.0 * curvature) : 0.0) >
+        2.0 * off + kLow * on[i]) {
       continue;
     }
     const auto [s, least] = boost::math::tools::brent_find_minima(
@@ -363,12 +365,11 @@ class Tracer {
   bool SlopeAcross(const Curve& curve, double tau, double eta, double* slope) const {
     constexpr double step = 1e-3;
     std::array<double, 5> m{};
-    for (const int i : {-2, -1, 1, 2}) {
+    for (const size_t i : {0U, 1U, 3U, 4U}) {
       PlacedPose there;
-      if (!space_.Step(*curve.base, tau * curve.t + (eta + i * step) * curve.n, &there)) {
-        return false;
-      }
-      m.at(static_cast<size_t>(i + 2)) = there.pose.margin[curve.bound];
+      const double at = eta + (static_cast<double>(i) - 2.0) * step;
+      if (!space_.Step(*curve.base, tau * curve.t + at * curve.n, &there)) return false;
+      m.at(i) = there.pose.margin[curve.bound];
     }
     *slope = (m[0] - 8.0 * m[1] + 8.0 * m[3] - m[4]) / (12.0 * step);
     return true;
@@ -568,10 +569,10 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   Hit here = start;
   const Chebyshev& nodes = Nodes();
   VecX slope = space_.Slope(here.at, here.bound);
-  bool twice = false;  // the margin vanishes twice on this curve
-  double bend = kNan;  // rate of its slope across
+  bool twice = false;       // the margin vanishes twice on this curve
+  double curvature = kNan;  // rate of its slope across
   if (here.twice()) {
-    twice = Valley(here.at, here.bound, -here.way, &slope, &bend);
+    twice = Valley(here.at, here.bound, -here.way, &slope, &curvature);
     if (!twice) slope.setZero();
   }
   if (!(slope.norm() > 1e-12)) {
@@ -602,7 +603,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   double h = kFirstStep, size = 1e-3;
   double area = 0.0, error = 0.0;
   VecX n = slope.normalized();
-  double s0 = twice ? bend : slope.norm(), rate = 0.0;
+  double s0 = twice ? curvature : slope.norm(), rate = 0.0;
   loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
   enum class Event { kNone, kCorner, kCloses, kCrossing };
   int idle = 0;  // corners at the same point
@@ -783,7 +784,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       here.bound = corner;
       twice = touches;
       slope = space_.Slope(here.at, corner);
-      if (twice && !Valley(here.at, corner, -carried, &slope, &bend)) {
+      if (twice && !Valley(here.at, corner, -carried, &slope, &curvature)) {
         trouble_ = fmt::format("branches of {} cross at {:.6g}, {:.6g} on another bound",
                                space_.bounds()[static_cast<size_t>(corner)].name,
                                here.at.pose.at[0], here.at.pose.at[1]);
@@ -794,7 +795,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       loop.arcs.push_back({corner, {here.at.pose.at.head<2>()}});
       h = kFirstStep;
     } else if (twice) {
-      if (!Valley(here.at, here.bound, across, &slope, &bend)) {
+      if (!Valley(here.at, here.bound, across, &slope, &curvature)) {
         trouble_ = fmt::format("branches of {} part at {:.6g}, {:.6g}",
                                space_.bounds()[static_cast<size_t>(here.bound)].name,
                                here.at.pose.at[0], here.at.pose.at[1]);
@@ -808,7 +809,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       h = std::min(1.6 * h, kLargestStep);
     }
     if (!twice) slope = space_.Slope(here.at, here.bound);
-    s0 = twice ? bend : slope.norm();
+    s0 = twice ? curvature : slope.norm();
     n = slope.normalized();
     if (!(s0 > 1e-12)) break;
   }
