@@ -301,6 +301,7 @@ void SparseRank::Arrange() {
 
 std::vector<int> SparseRank::ColumnsAt(const std::vector<int>& places) const {
   std::vector<int> columns;
+  columns.reserve(places.size());
   for (const int place : places) columns.push_back(order_[static_cast<size_t>(place)]);
   std::sort(columns.begin(), columns.end());
   return columns;
