@@ -350,7 +350,7 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
       "Both ways close poses with the same code and evaluate the same margins of bounds; nothing "
       "else is common. Error of the boundary: last coefficients of its polynomials, and of three "
       "dimensions the Gauss–Kronrod rule's; of the lattice: what the last halving changed, "
-      "or half of the one before, and a quarter of the cells where bounds meet.");
+      "or half of the one before, and a quarter of the cells where bounds meet or cross.");
   if (!set.ranged.empty()) {
     reached.Note(
         "Of a range, sections at its values are intersected (all) or united (some), twice as many "
