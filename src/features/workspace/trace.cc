@@ -32,12 +32,13 @@ constexpr double kDip = 1e-8;            // the same between two nodes, by their
 constexpr double kBeside = 1e-6;         // of a difference quotient beside a curve
 constexpr double kNearlyStraight = 4.0;  // least value on a way by its second difference
 constexpr double kSmooth = 0.02;         // of a polynomial on a way, its last coefficient
+constexpr int kMostHalvings = 10;        // of such a way
 constexpr double kLow = 0.5;         // of a node's value, the least one about it that is looked at
 constexpr double kTouch = 1e-10;     // of its values, where it is zero
 constexpr double kFlat = 1e-4;       // of a margin's rates where it vanishes twice, the lesser one
 constexpr double kOffValley = 1e-6;  // of its slope's rate, the slope there
-constexpr int kMostHalvings = 10;    // of such a way
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
+constexpr double kSmallStep = 5e-5;  // below, rounding may hide the curvature
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
 constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
@@ -146,6 +147,15 @@ struct Gap {
   enum class Kind { kNegative, kZero, kLost } kind;  // lost: no polynomial follows the way there
 };
 template <typename Margin>
+std::pair<double, double> LeastOf(const Margin& margin, double a, double b) {
+  return boost::math::tools::brent_find_minima(
+      [&](double at) {
+        const double value = margin(at);
+        return std::isfinite(value) ? value : std::numeric_limits<double>::max();
+      },
+      a, b, 30);
+}
+template <typename Margin>
 std::optional<Gap> FirstGap(const Margin& margin, double a, double m_a, double b, double m_b,
                             int halvings = kMostHalvings) {
   Eigen::Matrix<double, kOfWay + 1, 1> value, c;
@@ -189,12 +199,7 @@ std::optional<Gap> FirstGap(const Margin& margin, double a, double m_a, double b
         2.0 * off + kLow * on[i]) {
       continue;
     }
-    const auto [s, least] = boost::math::tools::brent_find_minima(
-        [&](double at) {
-          const double value_there = margin(at);
-          return std::isfinite(value_there) ? value_there : std::numeric_limits<double>::max();
-        },
-        place(i - 1), place(i + 1), 30);
+    const auto [s, least] = LeastOf(margin, place(i - 1), place(i + 1));
     if (least < -zero) return Gap{s, Gap::Kind::kNegative};
     if (least <= zero) return Gap{s, Gap::Kind::kZero};
   }
@@ -255,10 +260,11 @@ class Tracer {
           return std::nullopt;
         }
       }
-      if (auto hit = ExitByTypeTwo(at, along, h, next)) return hit;
-      if (next.pose.margin.minCoeff() < 0.0) {
-        auto hit = Exit(at, along, h, next);
-        if (hit) return hit;
+      bool leaves = next.pose.margin.minCoeff() < 0.0;
+      auto hit = ExitByTypeTwo(at, along, h, next, &leaves);
+      if (!hit && leaves) hit = Exit(at, along, h, next);
+      if (hit) return hit;
+      if (leaves) {
         h *= 0.5;  // it left the branch between both
         if (h >= kLeastStep) continue;
         trouble_ = "poses are lost where a path leaves the set";
@@ -331,9 +337,9 @@ class Tracer {
     return std::nullopt;
   }
 
-  // The same where type 2 is reached before.
+  // The same where type 2 is reached before; `leaves`: there is such a place, found or not.
   std::optional<Hit> ExitByTypeTwo(const PlacedPose& at, const VecX& along, double h,
-                                   const PlacedPose& next) {
+                                   const PlacedPose& next, bool* leaves) {
     if (type2_ < 0) return std::nullopt;
     PlacedPose there;
     const auto margin = [&](double s) {
@@ -341,6 +347,7 @@ class Tracer {
     };
     const auto gap = FirstGap(margin, 0.0, at.pose.margin[type2_], h, next.pose.margin[type2_]);
     if (!gap || gap->kind == Gap::Kind::kLost) return std::nullopt;
+    *leaves = true;
     if (gap->kind == Gap::Kind::kNegative) {
       if (!space_.Step(at, gap->at * along, &there)) return std::nullopt;
       return Exit(at, along, gap->at, std::move(there));
@@ -464,12 +471,7 @@ class Tracer {
       if (on[i] > on[i - 1] || on[i] > on[i + 1] || on[i] > kLow * std::max(on[i - 1], on[i + 1])) {
         continue;
       }
-      auto [tau, least] = boost::math::tools::brent_find_minima(
-          [&](double to) {
-            const double m = margin(to);
-            return std::isfinite(m) ? m : std::numeric_limits<double>::max();
-          },
-          place(i + 1), place(i - 1), 30);
+      auto [tau, least] = LeastOf(margin, place(i + 1), place(i - 1));
       if (std::abs(least) > kTouch * value.cwiseAbs().maxCoeff()) continue;
       tau = Bottom(margin, tau);
       Vec2 slope;
@@ -722,7 +724,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       // Near a crossing, where its slope vanishes, the margin's rounding moves the curve.
       const double blur =
           s0 > 0.0
-              ? (singular ? kRoundings * Rounding(at[0], here.bound) / flattest : 0.0)
+              ? (singular && h < kSmallStep ? kRoundings * Rounding(at[0], here.bound) / flattest
+                                            : 0.0)
               : kRoundings * std::abs(here.at.pose.margin[here.bound]) / (rate * h * nodes.node[1]);
       failed = tail.maxCoeff() > kTail * size + blur && h > kLeastStep;
       if (failed) why = "it curves too much";

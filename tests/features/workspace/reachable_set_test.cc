@@ -570,7 +570,7 @@ TEST(ReachableSet, SectionsWithManyTypeTwoCurvesAreFollowed) {
     const Answer answer = Ask(platform, arguments);
     ASSERT_TRUE(answer.set.summary.ok()) << answer.set.verdict;
     EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
-    EXPECT_LT(answer.set.traced.error, 1e-7 * answer.set.traced.measure);
+    EXPECT_LT(answer.set.traced.error, 1e-8 * answer.set.traced.measure);
     if (std::isfinite(section.area)) {
       EXPECT_NEAR(answer.set.traced.measure, section.area, 3e-8 * section.area);
     }
