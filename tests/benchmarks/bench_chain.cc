@@ -59,14 +59,7 @@ void Simulation(benchmark::State& state, const Shape& shape, DriveMode mode) {
   const Mechanism mechanism = shape.make(static_cast<int>(state.range(0)));
   const Motion motion = shape.move(mechanism);
   const SimulationOptions options{.mode = mode};
-  CommandSample command;
-  const auto driven = [&](double t, DrivenSample* at) {
-    EvaluateMotion(motion, t, &command);
-    at->position = command.position;
-    at->velocity = command.velocity;
-    at->acceleration = command.acceleration;
-    return RunSummary::Done();
-  };
+  const DrivenMotion driven = FollowCommands(motion);
   for (auto _ : state) {
     const SimulationRun run = Simulate(mechanism, motion, driven, options);
     if (!run.summary.ok()) state.SkipWithError(run.summary.message.c_str());

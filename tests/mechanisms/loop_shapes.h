@@ -8,10 +8,22 @@
 #include <string>
 
 #include "base/demand.h"
+#include "base/run_summary.h"
 #include "mechanism/motion.h"
 #include "model_file/load_model.h"
 
 namespace mbv {
+
+/// What a simulation is driven by where the commands are the drives' own motion, which outlives it.
+inline auto FollowCommands(const Motion& motion) {
+  return [&motion, command = CommandSample()](double t, auto* at) mutable {
+    EvaluateMotion(motion, t, &command);
+    at->position = command.position;
+    at->velocity = command.velocity;
+    at->acceleration = command.acceleration;
+    return RunSummary::Done();
+  };
+}
 
 /// model.yaml that is written piece by piece.
 struct LoopShapeText {

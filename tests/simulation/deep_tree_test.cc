@@ -81,16 +81,6 @@ Motion SwingEachDrive(const Mechanism& mechanism, double amplitude) {
   return motion;
 }
 
-DrivenMotion FollowCommands(const Motion& motion) {
-  return [&motion, command = CommandSample()](double t, DrivenSample* at) mutable {
-    EvaluateMotion(motion, t, &command);
-    at->position = command.position;
-    at->velocity = command.velocity;
-    at->acceleration = command.acceleration;
-    return RunSummary::Done();
-  };
-}
-
 // Of all signals of a quantity that both have, relative to the largest.
 double LargestDifference(const Trace& a, const Trace& b, Quantity quantity) {
   double worst = 0.0, largest = 0.0;

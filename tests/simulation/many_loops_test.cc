@@ -19,16 +19,6 @@
 namespace mbv {
 namespace {
 
-DrivenMotion Commanded(const Motion& motion) {
-  return [&motion, command = CommandSample()](double t, DrivenSample* at) mutable {
-    EvaluateMotion(motion, t, &command);
-    at->position = command.position;
-    at->velocity = command.velocity;
-    at->acceleration = command.acceleration;
-    return RunSummary::Done();
-  };
-}
-
 // Of the motor's torque, relative to its largest.
 double WorstDifference(const Trace& a, const Trace& b) {
   const auto column = [](const Trace& trace) -> VecX {
@@ -101,7 +91,7 @@ TEST(ManyLoops, ARegularPoseOfANetIsNotALossOfControl) {
       ASSERT_TRUE(reference.summary.ok())
           << home_deg << ": " << from << " to " << to << ": " << reference.summary.message;
       const SimulationRun inverse =
-          Simulate(net, motion, Commanded(motion), {.mode = DriveMode::kInverse});
+          Simulate(net, motion, FollowCommands(motion), {.mode = DriveMode::kInverse});
       ASSERT_TRUE(inverse.summary.ok()) << inverse.summary.message;
       EXPECT_LT(WorstDifference(inverse.trace, reference.trace), 1e-10);
     }
@@ -247,7 +237,7 @@ TEST(FarFrames, OfSpringsOutputsAndFreeJointsSetNoLength) {
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_LT(WorstDifference(run.trace, near_run.trace), 1e-8);
   for (const DriveMode mode : {DriveMode::kInverse, DriveMode::kPrescribedMotion}) {
-    const SimulationRun simulated = Simulate(far, motion, Commanded(motion), {.mode = mode});
+    const SimulationRun simulated = Simulate(far, motion, FollowCommands(motion), {.mode = mode});
     ASSERT_TRUE(simulated.summary.ok()) << simulated.summary.message;
     EXPECT_LT(WorstDifference(simulated.trace, run.trace), 1e-7);
   }
@@ -280,10 +270,10 @@ TEST(ManyLoops, TheWitnessesAgreeOnChainsOfFourBars) {
     const ReferenceRun reference = RunReference(mechanism, motion);
     ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
     const SimulationRun inverse =
-        Simulate(mechanism, motion, Commanded(motion), {.mode = DriveMode::kInverse});
+        Simulate(mechanism, motion, FollowCommands(motion), {.mode = DriveMode::kInverse});
     ASSERT_TRUE(inverse.summary.ok()) << inverse.summary.message;
     EXPECT_LT(WorstDifference(inverse.trace, reference.trace), 1e-12) << loops;
-    const SimulationRun forward = Simulate(mechanism, motion, Commanded(motion), {});
+    const SimulationRun forward = Simulate(mechanism, motion, FollowCommands(motion), {});
     ASSERT_TRUE(forward.summary.ok()) << forward.summary.message;
     EXPECT_LT(WorstDifference(forward.trace, reference.trace), 1e-8) << loops;
     EXPECT_TRUE(inverse.not_unique.empty());
@@ -291,7 +281,7 @@ TEST(ManyLoops, TheWitnessesAgreeOnChainsOfFourBars) {
     Mechanism perturbed = mechanism;
     perturbed.bodies.back().mass *= 1.0 + 1e-6;
     const SimulationRun wrong =
-        Simulate(perturbed, motion, Commanded(motion), {.mode = DriveMode::kInverse});
+        Simulate(perturbed, motion, FollowCommands(motion), {.mode = DriveMode::kInverse});
     EXPECT_GT(WorstDifference(wrong.trace, reference.trace), 1e-9) << loops;
   }
 }
@@ -304,13 +294,13 @@ TEST(ManyLoops, ThatStandOnEachOtherDoNotDiverge) {
   motion.duration_s = 0.05;
   const ReferenceRun reference = RunReference(lift, motion);
   ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
-  const SimulationRun run = Simulate(lift, motion, Commanded(motion), {});
+  const SimulationRun run = Simulate(lift, motion, FollowCommands(motion), {});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   constexpr double kForces = 1e-6;  // the limit of a verdict
   EXPECT_LT(WorstDifference(run.trace, reference.trace), kForces);
   Mechanism perturbed = lift;
   for (Body& body : perturbed.bodies) body.mass *= 1.0 + 2.0 * kForces;
-  const SimulationRun wrong = Simulate(perturbed, motion, Commanded(motion), {});
+  const SimulationRun wrong = Simulate(perturbed, motion, FollowCommands(motion), {});
   EXPECT_GT(WorstDifference(wrong.trace, reference.trace), kForces);
 }
 
@@ -351,7 +341,7 @@ TEST(ManyLoops, FiveHundredLoopsRun) {
   const ReferenceRun reference = RunReference(mechanism, motion);
   ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
   const SimulationRun inverse =
-      Simulate(mechanism, motion, Commanded(motion), {.mode = DriveMode::kInverse});
+      Simulate(mechanism, motion, FollowCommands(motion), {.mode = DriveMode::kInverse});
   ASSERT_TRUE(inverse.summary.ok()) << inverse.summary.message;
   EXPECT_LT(WorstDifference(inverse.trace, reference.trace), 1e-10);
 }
