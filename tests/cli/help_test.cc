@@ -32,7 +32,7 @@ class HelpTest : public testing::Test {
   }
   std::vector<std::string> Commands() const { return test::AllCommands(mbverify); }
   ProgramResult WithColumns(int columns, const std::string& arguments) const {
-    return mbverify.Script("COLUMNS=" + std::to_string(columns) + " \"$mbverify\" " + arguments);
+    return mbverify.Forked(arguments, std::to_string(columns).c_str());
   }
   // On a terminal of this width; `variables` are set for the program.
   std::string OnTerminal(int columns, const std::string& variables,
@@ -67,8 +67,7 @@ TEST_F(HelpTest, ExamplesNameFilesThatAreThere) {
   const std::regex path("scenarios/[a-z_/]+(\\.yaml)?");
   std::set<std::string> seen;
   for (const std::string& command : Commands()) {
-    const std::string help =
-        mbverify.Script("COLUMNS=400 \"$mbverify\" " + command + " --help").out;
+    const std::string help = WithColumns(400, command + " --help").out;
     for (std::sregex_iterator it(help.begin(), help.end(), path), end; it != end; ++it) {
       if (it->str().find("my_") != std::string::npos) continue;  // the reader's own
       seen.insert(it->str());
@@ -106,7 +105,7 @@ TEST_F(HelpTest, EveryCommandIsFoundFromAMisspelling) {
   for (const std::string& command : Commands()) {
     std::string misspelt = command;
     misspelt.insert(misspelt.size() - 1, "x");
-    const ProgramResult result = mbverify(misspelt);
+    const ProgramResult result = mbverify.Forked(misspelt);
     const std::string name = command.substr(command.rfind(' ') + 1);
     EXPECT_EQ(result.exit_code, 2) << misspelt;
     EXPECT_TRUE(result.out.empty()) << result.out;
@@ -115,7 +114,8 @@ TEST_F(HelpTest, EveryCommandIsFoundFromAMisspelling) {
         << result.err;
     EXPECT_NE(result.err.find("did you mean '" + name + "'?"), std::string::npos) << result.err;
   }
-  EXPECT_NE(mbverify("quite_another").err.find("commands: init, list, check"), std::string::npos);
+  EXPECT_NE(mbverify.Forked("quite_another").err.find("commands: init, list, check"),
+            std::string::npos);
 }
 
 TEST_F(HelpTest, EveryLongOptionIsFoundFromAMisspelling) {
@@ -123,13 +123,13 @@ TEST_F(HelpTest, EveryLongOptionIsFoundFromAMisspelling) {
   const std::regex option("\n +(-[a-z],)?(--[a-z-]+)");
   std::set<std::string> tried;
   for (const std::string& command : Commands()) {
-    const std::string help = "\n" + mbverify(command + " --help").out;
+    const std::string help = "\n" + mbverify.Forked(command + " --help").out;
     bool any = false;
     for (std::sregex_iterator it(help.begin(), help.end(), option), end; it != end; ++it) {
       const std::string name = it->str(2), misspelt = name + "q";
       if (!tried.insert(name).second && any) continue;
       any = true;
-      const ProgramResult result = mbverify(command + " " + misspelt);
+      const ProgramResult result = mbverify.Forked(command + " " + misspelt);
       EXPECT_EQ(result.exit_code, 2) << command << " " << misspelt;
       EXPECT_NE(result.err.find("has no option '" + misspelt + "'"), std::string::npos)
           << command << ": " << result.err;
@@ -142,11 +142,11 @@ TEST_F(HelpTest, EveryLongOptionIsFoundFromAMisspelling) {
 TEST_F(HelpTest, ModelsAndScenariosAreFoundFromAMisspellingInEveryCommandThatTakesOne) {
   int models = 0, scenarios = 0;
   for (const std::string& command : Commands()) {
-    const std::string help = mbverify(command + " --help").out;
+    const std::string help = mbverify.Forked(command + " --help").out;
     const std::string usage = LinesOf(help)[1];
     if (help.find("\n  model TEXT") != std::string::npos) {
       ++models;
-      const ProgramResult result = mbverify(command + " scara_robt");
+      const ProgramResult result = mbverify.Forked(command + " scara_robt");
       EXPECT_EQ(result.exit_code, 2) << command;
       EXPECT_NE(result.err.find("did you mean 'scara_robot'?"), std::string::npos)
           << command << ": " << result.err;
@@ -194,22 +194,22 @@ TEST_F(HelpTest, ParametersAndOutputsAreFoundFromAMisspelling) {
 }
 
 TEST_F(HelpTest, CommandsStandUnderHeadingsAndAreListedWithoutAny) {
-  const ProgramResult alone = mbverify("");
+  const ProgramResult alone = mbverify.Forked("");
   EXPECT_EQ(alone.exit_code, 2) << "nothing was verified";
-  EXPECT_EQ(alone.out, mbverify("--help").out);
-  EXPECT_EQ(mbverify("help").out, alone.out);
+  EXPECT_EQ(alone.out, mbverify.Forked("--help").out);
+  EXPECT_EQ(mbverify.Forked("help").out, alone.out);
   EXPECT_LT(alone.out.find("\nVerify:\n  run "), alone.out.find("\nUnderstand:\n"));
   EXPECT_EQ(Below("").size(), 31u) << "a new command has a heading";
-  EXPECT_EQ(mbverify("-V").out, mbverify("--version").out);
+  EXPECT_EQ(mbverify.Forked("-V").out, mbverify.Forked("--version").out);
 }
 
 TEST_F(HelpTest, HelpOfACommandIsItsHelp) {
   for (const char* command : {"run", "history compare"}) {
-    const ProgramResult help = mbverify(std::string("help ") + command);
+    const ProgramResult help = mbverify.Forked(std::string("help ") + command);
     EXPECT_EQ(help.exit_code, 0);
-    EXPECT_EQ(help.out, mbverify(command + std::string(" --help")).out);
+    EXPECT_EQ(help.out, mbverify.Forked(command + std::string(" --help")).out);
   }
-  const ProgramResult none = mbverify("help history comqare");
+  const ProgramResult none = mbverify.Forked("help history comqare");
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_EQ(none.err,
             "error: there is no command 'mbverify history comqare'\n"
@@ -217,15 +217,16 @@ TEST_F(HelpTest, HelpOfACommandIsItsHelp) {
 }
 
 TEST_F(HelpTest, WrongOptionsAreErrorsWithTheUsage) {
-  EXPECT_EQ(mbverify("sensitivity").err,
+  EXPECT_EQ(mbverify.Forked("sensitivity").err,
             "error: scenario is required\nusage: mbverify sensitivity [OPTIONS] scenario\n"
             "  hint: see mbverify sensitivity --help\n");
-  EXPECT_EQ(mbverify("package --check a.zip b.yaml").err,
+  EXPECT_EQ(mbverify.Forked("package --check a.zip b.yaml").err,
             "error: package --check takes one archive\n");
-  EXPECT_TRUE(mbverify("package").err.starts_with("error: scenario is required\n"));
+  EXPECT_TRUE(mbverify.Forked("package").err.starts_with("error: scenario is required\n"));
+  EXPECT_TRUE(mbverify.Forked("package --check a.zip --force")
+                  .err.starts_with("error: --check excludes --force"));
   EXPECT_TRUE(
-      mbverify("package --check a.zip --force").err.starts_with("error: --check excludes --force"));
-  EXPECT_TRUE(mbverify("crosscheck x --program y").err.starts_with("error: --program requires"));
+      mbverify.Forked("crosscheck x --program y").err.starts_with("error: --program requires"));
 }
 
 TEST_F(HelpTest, FormerNamesOfCommandsStillWorkButAreNotShown) {
@@ -255,7 +256,7 @@ TEST_F(HelpTest, ColourIsForcedAndRefusedByVariables) {
 }
 
 TEST_F(HelpTest, ScenariosAreFoundByTheirNames) {
-  EXPECT_EQ(mbverify("check four_bar/turn_inverse").out,
+  EXPECT_EQ(mbverify.Forked("check four_bar/turn_inverse").out,
             "scenarios/four_bar/turn_inverse.yaml: ok\n");
 }
 

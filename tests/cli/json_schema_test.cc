@@ -237,7 +237,7 @@ TEST_F(JsonSchemaTest, DocumentsFitChangedOnesAreRefusedAndEverySchemaIsUsed) {
   }
   // Every command that has --json is among the calls.
   for (const std::string& command : test::AllCommands(mbverify)) {
-    if (mbverify(command + " --help").out.find("\n  --json ") == std::string::npos) continue;
+    if (mbverify.Forked(command + " --help").out.find("\n  --json ") == std::string::npos) continue;
     EXPECT_TRUE(std::ranges::any_of(kCalls, [&](const Call& call) {
       return std::string(call.arguments).starts_with(command + " ") || call.arguments == command;
     })) << command;

@@ -17,7 +17,7 @@ inline std::vector<std::string> CommandsBelow(const Program& mbverify, const std
       "Robots and motors:", "Engines:", "Publish:", "Shell:"};
   std::vector<std::string> names;
   bool inside = false;
-  std::istringstream help(mbverify(command + " --help").out);
+  std::istringstream help(mbverify.Forked(command + " --help").out);
   for (std::string line; std::getline(help, line);) {
     inside = kHeadings.contains(line) || (inside && line.starts_with("  "));
     const bool is_name = inside && line.starts_with("  ") && line.size() > 2 && line[2] != ' ';

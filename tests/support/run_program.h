@@ -1,15 +1,20 @@
 // Runs the built program as a user would.
 #pragma once
 
+#include <fcntl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <sstream>
 #include <string>
+#include <vector>
 
+#include "program.h"
 #include "tests/support/source_dir.h"
 
 namespace mbv {
@@ -32,6 +37,10 @@ class Program {
   explicit Program(const std::string& name)
       : folder_(std::filesystem::temp_directory_path() /
                 ("mbv_cli_" + name + "_" + std::to_string(getpid()))) {
+    if (std::getenv(kInFork) != nullptr) {
+      std::fputs("a fork of a test has started workers\n", stderr);
+      _exit(127);
+    }
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
@@ -44,6 +53,28 @@ class Program {
 
   ProgramResult operator()(const std::string& arguments) const {
     return Execute("NO_COLOR= " + Call(arguments));
+  }
+  /// The same in a fork of the test, which has the program inside: nothing is loaded anew, which
+  /// is most of what help and wrong arguments cost. Not for what starts workers: they would be
+  /// this test. Words are parted by blanks or in ''.
+  ProgramResult Forked(const std::string& arguments, const char* columns = nullptr) const {
+    std::vector<std::string> words = {std::string(kBinaryDir) + "/mbverify"};
+    for (bool quoted = false, inside = false; const char c : arguments) {
+      if (c == '\'') quoted = !quoted;
+      if (c == '\'' || c == ' ') {
+        if (!quoted && c == ' ') inside = false;
+        if (c == '\'' || !quoted) continue;
+      }
+      if (!inside) words.emplace_back();
+      inside = true;
+      words.back() += c;
+    }
+    std::cout.flush(), std::fflush(nullptr);  // else the fork writes it, too
+    const pid_t child = fork();
+    if (child == 0) RunIn(words, columns);
+    int status = -1;
+    waitpid(child, &status, 0);
+    return Result(status);
   }
   /// With another search path for programs.
   ProgramResult WithPath(const std::string& path, const std::string& arguments) const {
@@ -71,10 +102,31 @@ class Program {
     const std::string command = "cd '" + std::string(kSourceDir) + "' && " + call + " >'" +
                                 (folder_ / "stdout").string() + "' 2>'" +
                                 (folder_ / "stderr").string() + "'";
-    const int status = std::system(command.c_str());
+    return Result(std::system(command.c_str()));
+  }
+  [[nodiscard]] ProgramResult Result(int status) const {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, ReadAll(folder_ / "stdout"),
             ReadAll(folder_ / "stderr")};
   }
+  // The forked process, with the output and the surroundings that Execute() gives.
+  [[noreturn]] void RunIn(std::vector<std::string>& words, const char* columns) const {
+    for (const auto& [name, number] : {std::pair("stdout", 1), std::pair("stderr", 2)}) {
+      const int file = open((folder_ / name).c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+      if (file < 0 || dup2(file, number) < 0) _exit(127);
+    }
+    if (chdir(kSourceDir) != 0) _exit(127);
+    setenv("NO_COLOR", "", 1);
+    setenv(kInFork, "", 1);
+    if (columns != nullptr) setenv("COLUMNS", columns, 1);
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const int code = RunProgram(static_cast<int>(words.size()), argv.data());
+    std::cout.flush(), std::fflush(nullptr);
+    _exit(code);
+  }
+
+  static constexpr const char* kInFork = "MBV_TEST_IN_FORK";
 
   std::filesystem::path folder_;
 };
