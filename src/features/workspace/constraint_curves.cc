@@ -1,12 +1,13 @@
-// Constraint singularities inside a set of two dimensions: curves where the joints alone lose rank
-// [Zlatanov, Bonev, Gosselin 2002], which the set passes unnoticed.
+// Constraint singularities inside a set of two or three dimensions: curves or surfaces where the
+// joints alone lose rank [Zlatanov, Bonev, Gosselin 2002], which the set passes unnoticed.
 //
 //   e = det [A_s; Nᵀ] / (its value at the set's start)                                         (1)
 //
 // A_s: rows of the loops (pose_space.h, 1) that are independent at home, N: the motions. N goes on
 // smoothly through such a pose, A_s loses rank there, and e changes its sign. Between neighbours of
 // the flooded lattice with different signs the pose where e vanishes is found along the straight
-// line; nodes of one cell are joined. Poses where only the choice A_s is dependent are none.
+// line; nodes of one cell, or of its simplices, are joined. Poses where only the choice A_s is
+// dependent are none.
 #include "features/workspace/reachable_set.h"
 
 #include <Eigen/LU>
@@ -16,6 +17,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "kinematics/constraints.h"
 
@@ -103,52 +105,76 @@ double RootOf(const std::array<double, 6>& x, std::array<double, 6> f) {
   return root;
 }
 
-}  // namespace
+// Corners of the flooded lattice inside a set, and where e vanishes between two of them.
+class LatticeZeros {
+ public:
+  using Key = std::array<long, 3>;
 
-std::vector<TracedArc> ConstraintCurves(const SetQuestion& question, const ReachableSet& set) {
-  PoseSpace space(question.mechanism, question.settings);
-  const auto bound =
-      std::ranges::find(space.bounds(), SetBound::Kind::kConstraint, &SetBound::kind);
-  PlacedPose start;
-  if (question.settings.over != 2 || bound == space.bounds().end() || !space.Home(&start) ||
-      !space.Place(set.start_pose, &start)) {
-    return {};
+  explicit LatticeZeros(const SetQuestion& question)
+      : space_(question.mechanism, question.settings), determinant_(space_) {}
+
+  bool Begin(const ReachableSet& set) {
+    PlacedPose start;
+    if (!space_.Home(&start) || !space_.Place(set.start_pose, &start)) return false;
+    space_.CountFrom(&start);
+    if (!determinant_.Begin(start)) return false;
+    for (const FloodPoint& point : set.flooded.lattice) {
+      Corner corner;
+      if (!point.inside || !space_.Place(point.pose, &corner.at)) continue;
+      corner.e = determinant_.At(corner.at);
+      Key key{};
+      for (int c = 0; c < space_.over(); ++c) {
+        key.at(static_cast<size_t>(c)) = std::lround(
+            (point.at[c] - set.start[c]) / set.flooded.lattice_step.at(static_cast<size_t>(c)));
+      }
+      corners_[key] = std::move(corner);
+    }
+    return true;
   }
-  space.CountFrom(&start);
-  LoopDeterminant determinant(space);
-  if (!determinant.Begin(start)) return {};
+  /// The constraint singularity's own bound.
+  [[nodiscard]] int bound() const {
+    const auto at =
+        std::ranges::find(space_.bounds(), SetBound::Kind::kConstraint, &SetBound::kind);
+    return static_cast<int>(at - space_.bounds().begin());
+  }
+  [[nodiscard]] std::vector<Key> keys() const {
+    std::vector<Key> keys;
+    for (const auto& [key, corner] : corners_) keys.push_back(key);
+    return keys;
+  }
+  /// 0 of a corner that is not inside.
+  [[nodiscard]] int SignAt(const Key& key) const {
+    const auto at = corners_.find(key);
+    return at == corners_.end() ? 0 : at->second.e < 0.0 ? -1 : 1;
+  }
+  /// Each line is asked several times. Nothing where both have the same sign, or the chosen rows
+  /// alone lose rank.
+  const std::optional<Vec3>& Between(const Key& one, const Key& other) {
+    const auto line = std::minmax(one, other);
+    const auto [known, is_new] = nodes_.try_emplace({line.first, line.second});
+    if (is_new) known->second = Find(line.first, line.second);
+    return known->second;
+  }
+
+ private:
   struct Corner {
     PlacedPose at;
     double e = kNan;
   };
-  using Key = std::pair<long, long>;
-  std::map<Key, Corner> corners;
-  const auto& step = set.flooded.lattice_step;
-  for (const FloodPoint& point : set.flooded.lattice) {
-    Corner corner;
-    if (!point.inside || !space.Place(point.pose, &corner.at)) continue;
-    corner.e = determinant.At(corner.at);
-    corners[{std::lround((point.at[0] - set.start[0]) / step[0]),
-             std::lround((point.at[1] - set.start[1]) / step[1])}] = std::move(corner);
-  }
-  // The node between two corners; each line is asked twice.
-  std::map<std::pair<Key, Key>, std::optional<Eigen::Vector2d>> nodes;
-  const auto between = [&](const Key& k1, const Key& k2) {
-    const auto known = nodes.find({k1, k2});
-    if (known != nodes.end()) return known->second;
-    std::optional<Eigen::Vector2d>& node = nodes[{k1, k2}];
-    const auto a = corners.find(k1), b = corners.find(k2);
-    if (a == corners.end() || b == corners.end() || (a->second.e < 0.0) == (b->second.e < 0.0)) {
-      return node;
+
+  [[nodiscard]] std::optional<Vec3> Find(const Key& k1, const Key& k2) const {
+    const auto a = corners_.find(k1), b = corners_.find(k2);
+    if (a == corners_.end() || b == corners_.end() || (a->second.e < 0.0) == (b->second.e < 0.0)) {
+      return std::nullopt;
     }
     const VecX from = a->second.at.pose.at, way = b->second.at.pose.at - from;
     // On this line, from the corner on the same side; very near the curve poses do not close.
     const auto look = [&](double s, bool first, double* e, double* pivot) {
       PlacedPose there;
       const PlacedPose& near = first ? a->second.at : b->second.at;
-      if (!space.Close(near, from + s * way, &there)) return false;
-      *e = determinant.At(there);
-      *pivot = determinant.LastPivot(there);
+      if (!space_.Close(near, from + s * way, &there)) return false;
+      *e = determinant_.At(there);
+      *pivot = determinant_.LastPivot(there);
       return std::isfinite(*e);
     };
     double e = kNan, pivot = kNan, root = a->second.e / (a->second.e - b->second.e);
@@ -160,34 +186,98 @@ std::vector<TracedArc> ConstraintCurves(const SetQuestion& question, const Reach
         const double share = std::array{-1.0, -0.65, -0.3, 0.3, 0.65, 1.0}.at(k);
         const double s = root + share * reach;
         x.at(k) = share * reach;
-        if (!look(s, k < 3, &e, &pivot)) return node;
+        if (!look(s, k < 3, &e, &pivot)) return std::nullopt;
         f.at(k) = e;
         if (std::abs(share) == 0.3) near += pivot;
         if (std::abs(share) == 1.0) far += pivot;
       }
-      if (f[2] == f[3]) return node;
+      if (f[2] == f[3]) return std::nullopt;
       const double step = RootOf(x, f);
-      if (!(std::abs(step) < reach)) return node;
+      if (!(std::abs(step) < reach)) return std::nullopt;
       root += step;
       // All rows together lose rank there, not the chosen ones alone.
-      if (reach < 0.2 && std::abs(step) < 1e-3 && near > kLessNear * far) return node;
+      if (reach < 0.2 && std::abs(step) < 1e-3 && near > kLessNear * far) return std::nullopt;
     }
-    node = Eigen::Vector2d((from + root * way).head<2>());
+    Vec3 node = Vec3::Zero();
+    node.head(space_.over()) = (from + root * way).head(space_.over());
     return node;
-  };
+  }
+
+  PoseSpace space_;
+  LoopDeterminant determinant_;
+  std::map<Key, Corner> corners_;
+  std::map<std::pair<Key, Key>, std::optional<Vec3>> nodes_;
+};
+
+}  // namespace
+
+std::vector<TracedArc> ConstraintCurves(const SetQuestion& question, const ReachableSet& set) {
+  LatticeZeros zeros(question);
   std::vector<TracedArc> arcs;
-  for (const auto& [key, corner] : corners) {
-    const auto [i, j] = key;
-    const std::array<std::optional<Eigen::Vector2d>, 4> sides = {
-        between({i, j}, {i + 1, j}), between({i, j}, {i, j + 1}),
-        between({i + 1, j}, {i + 1, j + 1}), between({i, j + 1}, {i + 1, j + 1})};
-    TracedArc arc{static_cast<int>(bound - space.bounds().begin()), {}};
+  if (question.settings.over != 2 || !zeros.Begin(set)) return arcs;
+  for (const auto& [i, j, unused] : zeros.keys()) {
+    const std::array<std::optional<Vec3>, 4> sides = {
+        zeros.Between({i, j, 0}, {i + 1, j, 0}), zeros.Between({i, j, 0}, {i, j + 1, 0}),
+        zeros.Between({i + 1, j, 0}, {i + 1, j + 1, 0}),
+        zeros.Between({i, j + 1, 0}, {i + 1, j + 1, 0})};
+    TracedArc arc{zeros.bound(), {}};
     for (const auto& node : sides) {
-      if (node) arc.points.push_back(*node);
+      if (node) arc.points.emplace_back(node->head<2>());
     }
     if (arc.points.size() == 2) arcs.push_back(std::move(arc));
   }
   return arcs;
+}
+
+TriangleMesh ConstraintSurface(const SetQuestion& question, const ReachableSet& set) {
+  using Key = LatticeZeros::Key;
+  LatticeZeros zeros(question);
+  TriangleMesh mesh;
+  if (question.settings.over != 3 || !zeros.Begin(set)) return mesh;
+  std::map<std::pair<Key, Key>, int> vertices;
+  // The vertex between two corners, −1 without.
+  const auto vertex = [&](const Key& one, const Key& other) {
+    const std::optional<Vec3>& node = zeros.Between(one, other);
+    if (!node) return -1;
+    const auto line = std::minmax(one, other);
+    const auto [known, is_new] = vertices.try_emplace({line.first, line.second}, 0);
+    if (is_new) {
+      known->second = static_cast<int>(mesh.vertices.size());
+      mesh.vertices.push_back(*node);
+    }
+    return known->second;
+  };
+  const auto add = [&](const std::array<int, 3>& triangle) {
+    if (std::ranges::min(triangle) >= 0) mesh.triangles.push_back(triangle);
+  };
+  for (const Key& cell : zeros.keys()) {
+    // Kuhn's simplices: one per order of the coordinates.
+    std::array<size_t, 3> order = {0, 1, 2};
+    do {
+      std::array<Key, 4> corner{cell};
+      for (size_t i = 0; i < 3; ++i) {
+        corner.at(i + 1) = corner.at(i);
+        ++corner.at(i + 1).at(order.at(i));
+      }
+      std::vector<Key> below, above;
+      for (const Key& key : corner) {
+        const int sign = zeros.SignAt(key);
+        if (sign < 0) below.push_back(key);
+        if (sign > 0) above.push_back(key);
+      }
+      if (below.size() + above.size() < 4) continue;
+      if (below.size() > above.size()) std::swap(below, above);
+      if (below.size() == 1) {
+        add({vertex(below[0], above[0]), vertex(below[0], above[1]), vertex(below[0], above[2])});
+      } else if (below.size() == 2) {
+        const int a = vertex(below[0], above[0]), b = vertex(below[0], above[1]),
+                  c = vertex(below[1], above[1]), d = vertex(below[1], above[0]);
+        add({a, b, c});
+        add({a, c, d});
+      }
+    } while (std::next_permutation(order.begin(), order.end()));
+  }
+  return mesh;
 }
 
 }  // namespace mbv

@@ -419,7 +419,9 @@ class QualityMapper {
         body = passed.parent == body ? passed.child : passed.parent;
         if (body == 0 || body == output_.reference_body) break;
         const auto& around = joints_of[static_cast<size_t>(body)];
-        single = single && around.size() == 2 && !on_line[static_cast<size_t>(body)];
+        // A loop that floats leads back.
+        single = single && around.size() == 2 && !on_line[static_cast<size_t>(body)] &&
+                 body != output_.body;
         if (single) joint = around[0] == joint ? around[1] : around[0];
       }
       if (single && drives == 1) limbs_.push_back(std::move(limb));

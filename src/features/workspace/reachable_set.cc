@@ -715,7 +715,9 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
     which.announce(fmt::format(
         "the lattice takes about {}{}", TimeText(plan.estimate_s),
         settings.over == 3
-            ? fmt::format(", the boundary up to {} (a million poses)", TimeText(boundary_s))
+            ? fmt::format(
+                  ", the boundary up to {} (a million poses; six where its sections change)",
+                  TimeText(boundary_s))
             : ""));
   }
   // Both ways at once; neither knows of the other.

@@ -12,6 +12,7 @@
 #include "base/diagnostics.h"
 #include "features/workspace/flood.h"
 #include "features/workspace/trace.h"
+#include "math/triangle_mesh.h"
 #include "verify/run_witnesses.h"
 
 namespace mbv {
@@ -109,5 +110,8 @@ void JudgeSet(ReachableSet* set);
 /// nodes each [m or rad], within a cell of the lattice. Empty of other dimensions.
 [[nodiscard]] std::vector<TracedArc> ConstraintCurves(const SetQuestion& question,
                                                       const ReachableSet& set);
+/// The same of three dimensions: a surface of free coordinates, nodes on lines between corners of
+/// the lattice.
+[[nodiscard]] TriangleMesh ConstraintSurface(const SetQuestion& question, const ReachableSet& set);
 
 }  // namespace mbv

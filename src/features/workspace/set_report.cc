@@ -385,6 +385,13 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
                     report.constraint.size()),
         On::kAll);
   }
+  if (const TriangleMesh& surface = report.constraint_surface; !surface.triangles.empty()) {
+    bounds.Note(fmt::format("constraint singularities inside the set, a surface of {} triangles in "
+                            "reachable_constraint.stl: the joints alone lose rank there, and the "
+                            "set goes on beyond",
+                            surface.triangles.size()),
+                On::kAll);
+  }
   sections.push_back(std::move(bounds));
 
   ReportSection quality{.title = "Quality", .link = "Quality"};
@@ -605,7 +612,7 @@ Json ToJson(const SetReport& report) {
       {"checked_poses", set.checked},
       {"checked_difference", Number(set.checked_off)},
       {"characteristic_length_m", Number(set.length)},
-      {"constraint_cells", report.constraint.size()},
+      {"constraint_cells", report.constraint.size() + report.constraint_surface.triangles.size()},
       {"quality", std::move(indices)}};
   if (!set.ranged.empty()) json[set.for_all ? "for_all" : "for_some"] = std::move(ranged);
   return json;
@@ -642,6 +649,9 @@ std::vector<std::pair<std::string, std::string>> SetFiles(const SetReport& repor
   const std::string title = report.mechanism + ": " + HeadLine(report);
   files.emplace_back("reachable.stl", ToStl(mesh, title));
   files.emplace_back("reachable.ply", ColoredPly(set, title));
+  if (!report.constraint_surface.triangles.empty()) {
+    files.emplace_back("reachable_constraint.stl", ToStl(report.constraint_surface, title));
+  }
   return files;
 }
 

@@ -23,7 +23,8 @@ struct SetReport {
   std::string mechanism;
   ReachableSet set;
   QualityMap quality;
-  std::vector<TracedArc> constraint;  ///< constraint singularities inside (constraint_curves.h)
+  std::vector<TracedArc> constraint;  ///< constraint singularities inside (constraint_curves.cc)
+  TriangleMesh constraint_surface;    ///< the same of three dimensions
   std::vector<KnownMeasure> known;
 
   /// Of both ways and of all that is known otherwise.
@@ -38,7 +39,7 @@ struct PrintedFigures {
   FigureStyle style;
 };
 /// The page, boundary and poses as CSV, figures, and of three dimensions the surface as STL and PLY
-/// with a colour per bound.
+/// with a colour per bound, and that of constraint singularities inside as STL.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> SetFiles(
     const SetReport& report, const PrintedFigures& printed = {});
 /// The surface of a set over x, y and z of an output, a mesh per bound, in the output's reference

@@ -30,6 +30,7 @@ constexpr double kRoundings = 10.0;      // by which a margin at a crossing is o
 constexpr double kBeyond = 1e-9;         // margins below −this are outside
 constexpr double kDip = 1e-8;            // the same between two nodes, by their polynomial
 constexpr double kBeside = 1e-6;         // of a difference quotient beside a curve
+constexpr double kSlopeOver = 1e-9;      // of one by two values on the way to it, the least
 constexpr double kNearlyStraight = 4.0;  // least value on a way by its second difference
 constexpr double kSmooth = 0.02;         // of a polynomial on a way, its last coefficient
 constexpr int kMostHalvings = 10;        // of such a way
@@ -39,12 +40,18 @@ constexpr double kFlat = 1e-4;       // of a margin's rates where it vanishes tw
 constexpr double kOffValley = 1e-6;  // of its slope's rate, the slope there
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kSmallStep = 5e-5;  // below, rounding may hide the curvature
-constexpr double kFirstStep = 0.05, kLargestStep = 0.4;
+constexpr double kBendingStep = 1e-3;
+constexpr double kFirstStep = 0.05, kLargestStep = 0.4, kLongerStep = 1.6;
 constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
 constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
 constexpr int kSpreadRows = 6;
 constexpr int kRays = 8, kChords = 12;  // from home; from each loop
+// Of a solid's section: loops with which it is lost (near an end, where it is only to get farther),
+// and steps of one. Where boundaries are all but noise, many sections are lost, one after the
+// other.
+constexpr size_t kMostLost = 2, kMostLostAtEnd = 1;
+constexpr int kMostStepsOfSection = 400;
 constexpr size_t kMostSections = 1200;
 // Beyond, a volume has the error that it has; a rough one goes on for longer.
 constexpr double kRough = 1e-3;
@@ -53,7 +60,7 @@ constexpr double kEndsShare = 0.1;            // of the progress
 constexpr double kSliver = 1e-3;              // of a part, within which its ends are known
 constexpr double kMoved = 0.02;               // of a solid's height, by which its ends have moved
 constexpr double kSlab = 1e-6, kWider = 4.0;  // of a solid's height, about a section that is lost
-constexpr double kMostSlabs = 0.01;
+constexpr double kMostSlabs = 0.01, kMostOfSlab = 1e3;
 constexpr size_t kNearSections = 2;  // on each side, whose poses begin another one
 
 // Root of a continuous function with different signs at both ends (Illinois), to rounding.
@@ -122,6 +129,21 @@ struct Chebyshev {
     }
     dense = P * coefficients;
     area = dense.transpose() * weight.asDiagonal() * (Q * coefficients);
+  }
+
+  // A value at node k of a function that begins with the square, by those at three nodes before.
+  [[nodiscard]] double Ahead(const std::array<double, kDegree + 1>& value, size_t k) const {
+    double sum = 0.0;
+    const size_t first = k > 3 ? k - 3 : 1;
+    for (size_t i = first; i < k; ++i) {
+      double weight = node.at(k) / node.at(i);
+      weight *= weight;
+      for (size_t j = first; j < k; ++j) {
+        if (j != i) weight *= (node.at(k) - node.at(j)) / (node.at(i) - node.at(j));
+      }
+      sum += weight * value.at(i);
+    }
+    return sum;
   }
 };
 const Chebyshev& Nodes() {
@@ -227,6 +249,10 @@ class Tracer {
   explicit Tracer(PoseSpace space) : space_(std::move(space)), type2_(space_.type2_bound()) {}
 
   [[nodiscard]] PoseSpace& space() { return space_; }
+  void LoseAfter(size_t loops, int steps) {
+    most_lost_ = loops;
+    most_steps_ = steps;
+  }
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
   [[nodiscard]] Vec2 ScaledAt(const PlacedPose& placed) const {
@@ -238,6 +264,9 @@ class Tracer {
                           const VecX& first_along = {}) {
     PlacedPose at = from;
     double h = kFirstStep, length = 0.0;
+    const bool in_box = std::ranges::all_of(
+        space_.settings().box,
+        [](const CoordinateRange& range) { return std::isfinite(range.upper - range.lower); });
     if (first > 0.0) {
       PlacedPose next;
       if (!space_.Step(from, first * first_along, &next)) return std::nullopt;
@@ -271,7 +300,7 @@ class Tracer {
         return std::nullopt;
       }
       length += h;
-      if (length > kFar) {
+      if (length > kFar && !in_box) {
         unbounded_ = true;
         return std::nullopt;
       }
@@ -399,14 +428,19 @@ class Tracer {
     if (n->dot(at.N_free.transpose() * inside) < 0.0) *n = -*n;
     return std::abs(axes.eigenvalues()[0]) < kFlat * *rate && slope.norm() < kOffValley * *rate;
   }
-  bool OnCurve(const Curve& curve, double tau, double* eta, PlacedPose* to) const {
+  // `steep`: about the margin's slope along n there; a better one then.
+  bool OnCurve(const Curve& curve, double tau, double* eta, PlacedPose* to,
+               double* steep = nullptr) const {
     if (HasRate(space_.bounds()[static_cast<size_t>(curve.bound)].kind)) {
       return space_.StepOn(curve.bound, *curve.base, tau, curve.t, to);
     }
     double x0 = *eta, f0 = 0.0, x1 = *eta;
-    // Margins have the rounding of numbers about 1.
+    // Margins have the rounding of numbers about 1, or of what a determinant is made of.
+    const double made_of =
+        curve.bound == type2_ ? space_.MarginOfTypeTwo(curve.base->type2_size) : 1.0;
     const double within =
-        curve.twice ? 1e-12 : std::max(1e-13, 4 * kEps / (curve.slope + curve.rate * tau));
+        curve.twice ? 1e-12
+                    : std::max(1e-13, 4 * kEps * made_of / (curve.slope + curve.rate * tau));
     for (int i = 0; i < 12; ++i) {
       double f1 = kNan;
       if (curve.twice) {
@@ -414,8 +448,10 @@ class Tracer {
       }
       if (!space_.Step(*curve.base, tau * curve.t + x1 * curve.n, to)) return false;
       if (!curve.twice) f1 = to->pose.margin[curve.bound];
-      double step = -f1 / (curve.slope + curve.rate * tau);
-      if (i > 0 && f1 != f0) step = -f1 * (x1 - x0) / (f1 - f0);
+      double slope = steep != nullptr ? *steep : curve.slope + curve.rate * tau;
+      if (i > 0 && f1 != f0) slope = (f1 - f0) / (x1 - x0);
+      if (steep != nullptr && std::abs(x1 - x0) > kSlopeOver) *steep = slope;
+      const double step = -f1 / slope;
       if (!std::isfinite(step) || std::abs(step) > 0.5) return false;
       if (std::abs(step) < within || f1 == 0.0) {
         *eta = x1;
@@ -486,9 +522,10 @@ class Tracer {
   [[nodiscard]] double Rounding(const PlacedPose& at, int bound) const {
     return kEps * std::max(1.0, bound == type2_ ? space_.MarginOfTypeTwo(at.type2_size) : 0.0);
   }
-  // Along the bound's curve, as `before` goes.
-  [[nodiscard]] VecX DirectionAt(const PlacedPose& at, int bound, const VecX& before) const {
-    const VecX t = Turned(space_.Slope(at, bound).normalized());
+  // Along a bound's curve, as `before` goes.
+  [[nodiscard]] static VecX DirectionAt(const PlacedPose& at, const VecX& slope,
+                                        const VecX& before) {
+    const VecX t = Turned(slope.normalized());
     return (at.N_free * t).dot(before) < 0.0 ? VecX(-t) : t;
   }
   // At a crossing, from one branch to the other one: that ray of it which bounds the set, whose
@@ -561,6 +598,8 @@ class Tracer {
 
   PoseSpace space_;
   int type2_;  // of its bounds
+  size_t most_lost_ = kMostLost;
+  int most_steps_ = kMostArcSteps;
   std::string trouble_;
   bool unbounded_ = false;
 };
@@ -607,15 +646,22 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
   VecX n = slope.normalized();
   double s0 = twice ? curvature : slope.norm(), rate = 0.0;
   loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
+  // Bounds whose margins vanish all along an arc; it has the first one's name.
+  std::vector<bool> same(space_.bounds().size(), true);
+  const auto end_arc = [&] {
+    const auto least = std::ranges::find(same, true) - same.begin();
+    if (loop.arcs.back().points.size() > 1) loop.arcs.back().bound = static_cast<int>(least);
+    same.assign(same.size(), true);
+  };
   enum class Event { kNone, kCorner, kCloses, kCrossing };
   int idle = 0;  // corners at the same point
-  for (int step = 0; step < kMostArcSteps; ++step) {
+  for (int step = 0; step < most_steps_; ++step) {
     const Curve curve{&here.at, here.bound, t, n, s0, rate, twice};
     const bool singular =
         !twice && IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
     std::array<PlacedPose, kDegree + 1> at;
     at[0] = here.at;
-    std::array<double, kDegree + 1> eta{};
+    std::array<double, kDegree + 1> eta{}, steep{s0};
     PlacedPose crossing;
     Eigen::Matrix2d H;
     Event event = Event::kNone;
@@ -624,6 +670,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
     double flattest = std::numeric_limits<double>::infinity();  // slope of the margin along n
     bool failed = false;
     const char* why = "no pose is near";
+    double fits = kLongerStep;  // a step by this one, by how the curve bends
     // First to find what ends the step, then to its end.
     for (int attempt = 0; attempt < 2; ++attempt) {
       double end = h;
@@ -633,9 +680,12 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
           break;
         }
         const double tau = h * nodes.node.at(k);
-        double e =
-            k > 1 ? eta.at(k - 1) * std::pow(nodes.node.at(k) / nodes.node.at(k - 1), 2) : 0.0;
-        failed = !OnCurve(curve, tau, &e, &at.at(k));
+        double e = nodes.Ahead(eta, k);
+        steep.at(k) = k == 1 ? s0 + rate * tau
+                             : steep.at(k - 1) + (steep.at(k - 1) - steep.at(k - 2)) *
+                                                     (nodes.node.at(k) - nodes.node.at(k - 1)) /
+                                                     (nodes.node.at(k - 1) - nodes.node.at(k - 2));
+        failed = !OnCurve(curve, tau, &e, &at.at(k), &steep.at(k));
         eta.at(k) = e;
         if (failed || attempt > 0) continue;
         const double before = h * nodes.node.at(k - 1);
@@ -680,13 +730,16 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
         const auto passed = [&](const PlacedPose& p) {
           return -(ScaledAt(p) - x_start).dot(along_start);
         };
-        if (here.bound == start.bound && (step > 0 || k > 3) && passed(at.at(k - 1)) > 0.0 &&
-            passed(at.at(k)) <= 0.0) {
+        // On another bound, too, that is the same here.
+        const Vec2 x_before = ScaledAt(at.at(k - 1)), x = ScaledAt(at.at(k));
+        if ((step > 0 || k > 3) && passed(at.at(k - 1)) > 0.0 && passed(at.at(k)) <= 0.0 &&
+            (x_start - x_before).norm() < 2.0 * (x - x_before).norm()) {
           const double s = find(passed, passed(at.at(k - 1)), passed(at.at(k)));
           double guess = e * std::pow(s / tau, 2);
           PlacedPose there;
           if (s < first && OnCurve(curve, s, &guess, &there) &&
-              (ScaledAt(there) - x_start).norm() < 1e-6) {
+              (ScaledAt(there) - x_start).norm() < 1e-6 &&
+              (here.bound == start.bound || there.pose.margin[start.bound] < kBeyond)) {
             first = s;
             event = Event::kCloses;
           }
@@ -727,7 +780,10 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
               ? (singular && h < kSmallStep ? kRoundings * Rounding(at[0], here.bound) / flattest
                                             : 0.0)
               : kRoundings * std::abs(here.at.pose.margin[here.bound]) / (rate * h * nodes.node[1]);
-      failed = tail.maxCoeff() > kTail * size + blur && h > kLeastStep;
+      const double curves = tail.maxCoeff() / (kTail * size + blur);
+      // Of short steps rounding is more than what bends.
+      if (h > kBendingStep) fits = 0.9 * std::pow(curves, -1.0 / kDegree);
+      failed = curves > 1.0 && h > kLeastStep;
       if (failed) why = "it curves too much";
       if (!failed && Dips(at, here.bound)) {
         failed = true;
@@ -743,11 +799,15 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
         error += tail[0] * span[1] + tail[1] * span[0] + 1e-12 * span.norm() * size;
         for (size_t k = 1; k <= kDegree; ++k) {
           loop.arcs.back().points.emplace_back(at.at(k).pose.at.head<2>());
+          for (size_t j = 0; j < same.size(); ++j) {
+            const double margin = at.at(k).pose.margin[static_cast<Eigen::Index>(j)];
+            if (std::abs(margin) > kBeyond) same[j] = static_cast<int>(j) == here.bound;
+          }
         }
       }
     }
     if (failed) {
-      h *= 0.5;
+      h *= std::clamp(fits, 0.2, fits < 0.9 ? 0.7 : 0.5);
       if (h < kLeastStep) {
         trouble_ = fmt::format("the boundary on {} is lost at {:.6g}, {:.6g}: {}",
                                space_.bounds()[static_cast<size_t>(here.bound)].name,
@@ -766,7 +826,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
     VecX along = carried;  // at the last node before a crossing
     if (event == Event::kCrossing && h >= 1e-13) {
       const PlacedPose& last = at[kDegree - 1];
-      along = last.N_free * DirectionAt(last, here.bound, carried);
+      along = last.N_free * DirectionAt(last, space_.Slope(last, here.bound), carried);
     }
     if (h >= 1e-13) here.at = std::move(at[kDegree]);
     if (event == Event::kCloses) {
@@ -777,6 +837,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
     s0 = rate = 0.0;
     if (event == Event::kCrossing) {
       rate = BranchOff(H, here.at.N_free.transpose() * along, &t, &n);
+      end_arc();
       loop.arcs.push_back({here.bound, {here.at.pose.at.head<2>()}});
       h = kFirstStep;
       continue;
@@ -795,6 +856,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       }
       t = Turned(slope.normalized());
       if (t.dot(old) < 0.0) t = -t;
+      end_arc();
       loop.arcs.push_back({corner, {here.at.pose.at.head<2>()}});
       h = kFirstStep;
     } else if (twice) {
@@ -806,16 +868,17 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
       }
       t = Turned(slope);
       if ((here.at.N_free * t).dot(carried) < 0.0) t = -t;
-      h = std::min(1.6 * h, kLargestStep);
+      h = std::min(std::min(fits, kLongerStep) * h, kLargestStep);
     } else {
-      t = DirectionAt(here.at, here.bound, carried);
-      h = std::min(1.6 * h, kLargestStep);
+      slope = space_.Slope(here.at, here.bound);
+      t = DirectionAt(here.at, slope, carried);
+      h = std::min(std::min(fits, kLongerStep) * h, kLargestStep);
     }
-    if (!twice) slope = space_.Slope(here.at, here.bound);
     s0 = twice ? curvature : slope.norm();
     n = slope.normalized();
     if (!(s0 > 1e-12)) break;
   }
+  end_arc();
   const double unit = space_.UnitOf(0) * space_.UnitOf(1);
   loop.area = left * area * unit;
   loop.error = error * unit;
@@ -949,14 +1012,17 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
     }
     section->loops.push_back(std::move(loop));
     chords.push_back(hit);
+    std::erase_if(lost, [&](const auto& other) { return Knows(section->loops, other.first); });
     return true;
   };
+  const auto is_lost = [&] { return !is_flat && lost.size() >= most_lost_; };
   for (const PlacedPose& seed : seeds) {
+    if (is_lost()) break;
     if (IsInside(section->loops, seed.pose.at.head<2>())) continue;
     inside->push_back(seed.pose);
     // Of a section of a solid one ray is enough; a loop that is lost from here is not from there.
     bool found = false;
-    for (int k = 0; k < kRays && (is_flat || !found); ++k) {
+    for (int k = 0; k < kRays && (is_flat || !found) && !is_lost(); ++k) {
       const double angle = 0.3 + 2 * pi * k / kRays;
       const VecX ray = Vec2(std::cos(angle) * space_.UnitOf(0), std::sin(angle) * space_.UnitOf(1));
       const auto hit = Walk(seed, ray);
@@ -964,7 +1030,7 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
     }
   }
   // Chords from points of each loop, found by rays from its first one.
-  for (size_t c = 0; c < chords.size(); ++c) {
+  for (size_t c = 0; c < chords.size() && !is_lost(); ++c) {
     const Hit from = chords[c];
     const VecX in = Inwards(from);
     PlacedPose near;
@@ -1002,9 +1068,8 @@ bool Tracer::TraceAll(const std::vector<PlacedPose>& seeds, TracedSection* secti
     section->area += loop.area;
     section->error += loop.error;
   }
-  for (const auto& [hit, why] : lost) {
-    if (Knows(section->loops, hit)) continue;
-    trouble_ = why;
+  if (!lost.empty()) {
+    trouble_ = lost.front().second;
     return false;
   }
   if (section->loops.empty()) return false;
@@ -1112,6 +1177,17 @@ class SolidTracer {
   void Report(double fraction) const {
     if (progress_) progress_(fraction);
   }
+  // work(i) for all i, on all threads.
+  void ForAll(size_t count, const std::function<void(size_t)>& work) const {
+    std::atomic<size_t> next = 0;
+    const auto run = [&] {
+      for (size_t i = next++; i < count; i = next++) work(i);
+    };
+    std::vector<std::thread> others;
+    for (int t = 1; t < threads_ && static_cast<size_t>(t) < count; ++t) others.emplace_back(run);
+    run();
+    for (std::thread& other : others) other.join();
+  }
   [[nodiscard]] std::string Trouble() const { return !lost_.empty() ? lost_ : solid_.trouble(); }
 
   // Up (or down) to the last section that there is.
@@ -1134,7 +1210,7 @@ class SolidTracer {
       target[2] = below;
       if (!solid_.space().Close(at, target, &low) || low.pose.margin.minCoeff() < 0.0) break;
       seeds_[below].push_back(low.pose);
-      (void)AreaAt(below);
+      (void)AreaAt(below, true);
       at = low;
       double highest = -std::numeric_limits<double>::infinity();
       for (const SpacePose& pose : seeds_[below]) {
@@ -1154,18 +1230,37 @@ class SolidTracer {
     bool wider = false;
     for (const double sign : {-1.0, 1.0}) {
       double& end = sign < 0.0 ? set->low : set->high;
+      // From poses from which none was sought before, each by itself.
+      std::vector<const SpacePose*> fresh;
+      for (const auto& [height, poses] : seeds_) {
+        size_t& walked = walked_.at(sign < 0.0 ? 0 : 1)[height];
+        for (; walked < poses.size(); ++walked) fresh.push_back(&poses[walked]);
+      }
+      std::vector<double> tops(fresh.size(), kNan);
+      std::atomic<long> closed = 0;
+      std::atomic<bool> endless = false;
+      ForAll(fresh.size(), [&](size_t i) {
+        Tracer tracer = solid_;
+        const long before = tracer.space().closings();
+        PlacedPose from;
+        if (tracer.space().Place(*fresh[i], &from)) {
+          const auto top = tracer.Walk(from, sign * tracer.space().UnitOf(2) * VecX::Unit(3, 2));
+          if (top) tops[i] = top->at.pose.at[2];
+        }
+        closed += tracer.space().closings() - before;
+        if (tracer.unbounded()) endless = true;
+      });
+      closings_ += closed;
+      unbounded_ = unbounded_ || endless;
       PlacedPose best;
       double farthest = end + sign * kTip * (set->high - set->low);
-      for (const auto& [height, poses] : seeds_) {
-        for (const SpacePose& pose : poses) {
-          PlacedPose from;
-          if (!solid_.space().Place(pose, &from)) continue;
-          const VecX up = sign * solid_.space().UnitOf(2) * VecX::Unit(3, 2);
-          const auto top = solid_.Walk(from, up);
-          if (!top || sign * (top->at.pose.at[2] - farthest) <= 0.0) continue;
-          farthest = top->at.pose.at[2];
-          best = from;
+      for (size_t i = 0; i < fresh.size(); ++i) {
+        PlacedPose from;
+        if (!(sign * (tops[i] - farthest) > 0.0) || !solid_.space().Place(*fresh[i], &from)) {
+          continue;
         }
+        farthest = tops[i];
+        best = from;
       }
       if (best.N.size() == 0) continue;
       const double other = Climb(best, sign);
@@ -1216,6 +1311,15 @@ class SolidTracer {
     return seeds;
   }
 
+  // Margins count from a pose of the section: by those at home their size may be anything.
+  static void CountFromFirst(Tracer* tracer, std::vector<PlacedPose>* seeds) {
+    if (seeds->empty()) return;
+    tracer->space().CountFrom(&seeds->front());
+    for (PlacedPose& seed : *seeds) {
+      const SpacePose pose = seed.pose;
+      (void)tracer->space().Place(pose, &seed);
+    }
+  }
   // Traces what a section does not have yet around these poses.
   static void Extend(Tracer* tracer, const std::vector<PlacedPose>& seeds,
                      const std::vector<Vec2>& holes, Found* found) {
@@ -1233,13 +1337,16 @@ class SolidTracer {
   static void Append(const std::vector<Vec2>& more, std::vector<Vec2>* points) {
     points->insert(points->end(), more.begin(), more.end());
   }
-  [[nodiscard]] Found TraceAt(double height) const {
+  [[nodiscard]] Found TraceAt(double height, bool at_end = false) const {
     Tracer tracer = flat_;
+    tracer.LoseAfter(at_end ? kMostLostAtEnd : kMostLost, kMostStepsOfSection);
     const long before = tracer.space().closings();
     tracer.space().Hold(2, height);
     Found found;
     found.section.height = height;
-    Extend(&tracer, SeedsAt(height, tracer.space()), {}, &found);
+    std::vector<PlacedPose> seeds = SeedsAt(height, tracer.space());
+    CountFromFirst(&tracer, &seeds);
+    Extend(&tracer, seeds, {}, &found);
     std::vector<Vec2> points = PointsIn(found.section);
     const auto above = sections_.lower_bound(height);
     if (above != sections_.end()) Append(MiddlesOfHoles(above->second), &points);
@@ -1265,10 +1372,17 @@ class SolidTracer {
       const auto at = sections_.find(changed.back());
       changed.pop_back();
       if (at == sections_.end()) continue;
-      for (const bool up : {false, true}) {
-        if (up ? std::next(at) == sections_.end() : at == sections_.begin()) continue;
-        const auto other = up ? std::next(at) : std::prev(at);
-        Found more = log_.Get<Found>([&] { return Extended(at->second, other->second); });
+      std::vector<std::map<double, TracedSection>::iterator> beside;
+      if (at != sections_.begin()) beside.push_back(std::prev(at));
+      if (std::next(at) != sections_.end()) beside.push_back(std::next(at));
+      auto extended = log_.Get<std::vector<Found>>([&] {
+        std::vector<Found> more(beside.size());
+        ForAll(more.size(), [&](size_t i) { more[i] = Extended(at->second, beside[i]->second); });
+        return more;
+      });
+      for (size_t i = 0; i < extended.size(); ++i) {
+        Found& more = extended[i];
+        const auto other = beside[i];
         closings_ += more.closings;
         if (!more.lost.empty()) {  // a part of it is not known: it is gone
           gone_[other->first] = more.lost;
@@ -1289,6 +1403,7 @@ class SolidTracer {
   // A section with those parts and holes of its neighbour that it does not have yet.
   [[nodiscard]] Found Extended(const TracedSection& neighbour, const TracedSection& section) const {
     Tracer tracer = flat_;
+    tracer.LoseAfter(kMostLost, kMostStepsOfSection);
     const long before = tracer.space().closings();
     tracer.space().Hold(2, section.height);
     std::vector<PlacedPose> seeds;
@@ -1301,16 +1416,17 @@ class SolidTracer {
         seeds.push_back(std::move(to));
       }
     }
+    CountFromFirst(&tracer, &seeds);
     Found more{section, seeds_.at(section.height), {}};
     Extend(&tracer, seeds, MiddlesOfHoles(neighbour), &more);
     more.closings = tracer.space().closings() - before;
     return more;
   }
 
-  double AreaAt(double height) {
+  double AreaAt(double height, bool at_end = false) {
     if (!lost_.empty()) return 0.0;
     if (!sections_.contains(height) && !gone_.contains(height)) {
-      Keep(log_.Get<Found>([&] { return TraceAt(height); }));
+      Keep(log_.Get<Found>([&] { return TraceAt(height, at_end); }));
     }
     const auto at = sections_.find(height);
     return at == sections_.end() ? kNan : at->second.area;
@@ -1334,14 +1450,7 @@ class SolidTracer {
     if (!lost_.empty() || heights.empty()) return;
     auto found = log_.Get<std::vector<Found>>([&] {
       std::vector<Found> traced(heights.size());
-      std::atomic<size_t> next = 0;
-      const auto run = [&] {
-        for (size_t i = next++; i < heights.size(); i = next++) traced[i] = TraceAt(heights[i]);
-      };
-      std::vector<std::thread> others;
-      for (int t = 1; t < threads_; ++t) others.emplace_back(run);
-      run();
-      for (std::thread& other : others) other.join();
+      ForAll(heights.size(), [&](size_t i) { traced[i] = TraceAt(heights[i]); });
       return traced;
     });
     for (Found& one : found) Keep(std::move(one));
@@ -1386,8 +1495,6 @@ class SolidTracer {
           settled.push_back(ruled);
           continue;
         }
-        const double slab =
-            std::isfinite(part.slab) ? kWider * part.slab : kSlab * (set.high - set.low);
         const auto first = gone_.lower_bound(part.a);
         const auto at = std::find_if(first, gone_.end(),
                                      [&](const auto& gone) { return part.Has(gone.first); });
@@ -1395,11 +1502,19 @@ class SolidTracer {
           lost_ = fmt::format("sections between {:.6g} and {:.6g} have no area", part.a, part.b);
           break;
         }
-        const double h = at->first, low = h - slab, high = h + slab;
+        const double h = at->first;
+        // As much volume wherever it is: wide where sections are small.
+        const double near = LargestArea(h, h), largest = LargestArea(set.low, set.high);
+        const double share = near > 0.0 ? std::clamp(largest / near, 1.0, kMostOfSlab) : 1.0;
+        const double slab = std::max(kSlab * share * (set.high - set.low),
+                                     std::isfinite(part.slab) ? kWider * part.slab : 0.0);
+        const double low = h - slab, high = h + slab;
         slabs_.emplace_back(std::max(part.a, low), std::min(part.b, high));
         double width = 0.0;
         for (const auto& [a, b] : slabs_) width += b - a;
-        if (width > kMostSlabs * (set.high - set.low)) lost_ = at->second;
+        if (width > kMostSlabs * (set.high - set.low) || closings_ >= kMostClosings) {
+          lost_ = at->second;
+        }
         if (low > part.a) rest.push_back({part.a, low, part.ends_a, true, slab});
         if (high < part.b) rest.push_back({high, part.b, true, part.ends_b, slab});
       }
@@ -1407,19 +1522,21 @@ class SolidTracer {
     }
     return settled;
   }
+  // Of the sections from a to b, and of those next to them.
+  [[nodiscard]] double LargestArea(double a, double b) const {
+    double area = 0.0;
+    auto at = sections_.lower_bound(a);
+    if (at != sections_.begin()) --at;
+    for (; at != sections_.end(); ++at) {
+      area = std::max(area, at->second.area);
+      if (at->first >= b) break;
+    }
+    return area;
+  }
   // Volume of what was left out, and all of it as its error.
   [[nodiscard]] double VolumeOfSlabs() const {
     double sum = 0.0;
-    for (const auto& [a, b] : slabs_) {
-      double area = 0.0;
-      if (const auto above = sections_.lower_bound(b); above != sections_.end()) {
-        area = above->second.area;
-      }
-      if (auto below = sections_.upper_bound(a); below != sections_.begin()) {
-        area = std::max(area, std::prev(below)->second.area);
-      }
-      sum += (b - a) * area;
-    }
+    for (const auto& [a, b] : slabs_) sum += (b - a) * LargestArea(a, b);
     return sum;
   }
 
@@ -1525,6 +1642,7 @@ class SolidTracer {
   const int threads_;
   ResultLog log_;
   std::map<double, std::vector<SpacePose>> seeds_;
+  std::array<std::map<double, size_t>, 2> walked_;  // of them, down and up
   std::map<double, TracedSection> sections_;
   std::map<double, std::string> gone_;            // heights without a section, and why
   std::vector<std::pair<double, double>> slabs_;  // left out

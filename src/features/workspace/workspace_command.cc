@@ -210,6 +210,7 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   report.quality = MapQuality(*question, report.set, question->output, arguments.jobs,
                               StageOf(progress, "qualities"));
   report.constraint = ConstraintCurves(*question, report.set);
+  report.constraint_surface = ConstraintSurface(*question, report.set);
   line->Clear();
   WorkspaceOutcome form;
   if (FindWorkspaceForm(mechanism.name) != nullptr) {

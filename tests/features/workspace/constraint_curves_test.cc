@@ -90,6 +90,34 @@ TEST(ConstraintCurves, OfATranslationalRobotAreTheCircleOfItsClosedForm) {
   }
 }
 
+// The same circle at every height: a part of its cylinder.
+TEST(ConstraintCurves, OfASolidAreTheSurfaceOfTheClosedForm) {
+  const Mechanism mechanism = ThreeUpu(0.15);
+  SetArguments arguments;
+  arguments.over = {"x=0.2:0.38", "y=-0.1:0.1", "z=0.38:0.44"};
+  arguments.flood.resolution = 24;
+  Diagnostics diagnostics;
+  const auto question = ReadQuestion(mechanism, arguments, &diagnostics);
+  ASSERT_TRUE(question.has_value()) << diagnostics.Text();
+  const ReachableSet set =
+      ComputeReachableSet(*question, arguments, {}, nullptr, {.boundary = false});
+  ASSERT_TRUE(set.summary.ok()) << set.diagnostics.Text() << set.verdict;
+  const TriangleMesh surface = ConstraintSurface(*question, set);
+  double off = 0.0, other = 1.0;
+  for (const Vec3& p : surface.vertices) {
+    off = std::max(off, std::abs(p.head<2>().norm() - 0.3));
+    other = std::min(other, std::abs(p.head<2>().norm() - 0.3 * 1.0001));
+  }
+  EXPECT_LT(off, 1e-7);
+  EXPECT_GT(other, 1e-5);  // another cylinder would be noticed
+  // Within the box, but for the cells at its sides.
+  const double whole = 2 * 0.3 * std::asin(0.1 / 0.3) * 0.06;
+  const double area = AreaOf(surface, 0, surface.triangles.size());
+  EXPECT_LT(area, whole);
+  EXPECT_GT(area, 0.5 * whole);
+  EXPECT_TRUE(ConstraintCurves(*question, set).empty());
+}
+
 TEST(ConstraintCurves, AreNoneOfRobotsThatHaveNone) {
   LoadResult result = LoadModel(SourcePath("/models/friction_five_bar/model.yaml"));
   EXPECT_TRUE(CurvesOf(*result.mechanism, {}).empty());

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <set>
 
 #include "analytic/scara_robot/workspace.h"
 #include "analytic/spr_tripod/workspace.h"
@@ -127,6 +128,12 @@ TEST(ReachableSet, AnArmsPathEndsWhereItIsStretched) {
 }
 
 // cos θ1 cos θ2 > cos α.
+// The drum turns a hundred times on the way.
+TEST(ReachableSet, ABoxEndsALongWay) {
+  const Answer answer = Ask(ShippedModel("winch"), Over({"z=-10:-0.5"}, 400));
+  ExpectMeasure(answer, 9.5, 1e-9);
+}
+
 TEST(ReachableSet, AConeOfAUniversalJointIsACone) {
   const Mechanism joint = FromText(R"(
 name: universal
@@ -577,6 +584,39 @@ TEST(ReachableSet, SectionsWithManyTypeTwoCurvesAreFollowed) {
   }
 }
 
+// Both feet of a limb reach 20° at once while the platform is level: its sections are bounded by
+// lines at p and q from the axis in turn, and each line by two joints. Beside them parts would be
+// followed for ever, or several times.
+TEST(ReachableSet, BoundsThatAreTheSameEndASetOnce) {
+  const Mechanism platform = ShippedModel("stabilizing_platform");
+  // Of p, q = u ± d with u = tan 20° times the height over the feet: √3 (4pq − p² − q²).
+  const double tan20 = std::tan(20 * pi / 180), feet = 0.225, d = 7.5 - 7.38;
+  const auto area = [&](double z) {
+    return std::sqrt(3.0) * (2 * std::pow(tan20 * (z - feet), 2) - 6 * d * d);
+  };
+  for (const double z : {3.15, 4.0}) {
+    SetArguments arguments = Over({"x", "y"}, 60);
+    arguments.at = {fmt::format("z={}", z)};
+    const Answer answer = Ask(platform, arguments);
+    ExpectMeasure(answer, area(z), 1e-8);
+    EXPECT_GT(area(z + 1e-6) - area(z), 1e-6);  // a thousandth of a millimetre would be noticed
+    ASSERT_EQ(answer.set.traced.sections.size(), 1u);
+    for (const TracedLoop& loop : answer.set.traced.sections[0].loops) {
+      std::set<int> bounds;
+      for (const TracedArc& arc : loop.arcs) bounds.insert(arc.bound);
+      EXPECT_EQ(bounds.size(), 6u);
+    }
+  }
+  // In a solid they are no change of its sections: one rule is enough.
+  SetArguments solid = Over({"x", "y", "z=2.7:4.5"}, 12);
+  const Answer answer = Ask(platform, solid);
+  const auto integral = [&](double z) {
+    return std::sqrt(3.0) * (2 * tan20 * tan20 * std::pow(z - feet, 3) / 3 - 6 * d * d * z);
+  };
+  ExpectMeasure(answer, integral(4.5) - integral(2.7), 1e-7);
+  EXPECT_LT(answer.set.traced.closings, 200000);
+}
+
 // This robot's drives lose their hold twice where its links lie flat, so that the determinant keeps
 // its sign: the set ends there all the same, and what lies below is its image.
 TEST(ReachableSet, ASetEndsWhereTheDeterminantVanishesTwice) {
@@ -927,6 +967,16 @@ TEST(Quality, AFourBarsTransmissionAngleIsThatByHand) {
   ASSERT_NE(of_crank, coupler.indices.end());
   // The crank pushes its end across itself, along which that moves.
   EXPECT_NEAR(coupler.values[0][of_crank - coupler.indices.begin()], 90.0, 1e-6);
+}
+
+// From the output around the loop and back to it: no limb.
+TEST(Quality, ALoopThatFloatsHasNoLimbs) {
+  SetArguments arguments = Over({"x=-0.05:0.05"}, 16);
+  arguments.output = "coupler";
+  const Answer answer = Ask(ShippedModel("floating_loop"), arguments);
+  ASSERT_TRUE(answer.set.agree) << answer.diagnostics.Text() << answer.set.verdict;
+  const QualityMap map = MapQuality(*answer.question, answer.set, "coupler", 1);
+  EXPECT_FALSE(map.why_none.empty() && map.no_limb.empty());
 }
 
 // Legs along lines: the angle of each by the point's velocity while it alone moves.
