@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -481,6 +482,135 @@ VecX SparseLeastNorm::LeastSquares(const VecX& c, int refinements) const {
   VecX y;
   saddle_.Solve(c, zero_rows_, &x_, &y, refinements);
   return -y;
+}
+
+SparseLu::Matrix SideBySide(const std::vector<const SparseLu::Matrix*>& parts) {
+  Eigen::Index columns = 0, entries = 0;
+  for (const SparseLu::Matrix* part : parts) {
+    columns += part->cols();
+    entries += part->nonZeros();
+  }
+  SparseLu::Matrix all(parts.front()->rows(), columns);
+  all.reserve(entries);
+  Eigen::Index at = 0;
+  for (const SparseLu::Matrix* part : parts) {
+    for (Eigen::Index c = 0; c < part->cols(); ++c, ++at) {
+      all.startVec(at);
+      for (SparseLu::Matrix::InnerIterator entry(*part, c); entry; ++entry) {
+        all.insertBack(entry.row(), at) = entry.value();
+      }
+    }
+  }
+  all.finalize();
+  return all;
+}
+
+namespace {
+
+// Of the length of the longest row of C: what keeps the inverse finite where C loses a direction.
+// Singular values change by its square only, and not those of the vectors found.
+constexpr double kShift = 1e-5;
+constexpr double kRitz = 1e-10;  // error of an eigenvalue, of itself
+constexpr int kMostLanczos = 400;
+constexpr int kOftenLanczos = 12;  // until then each step is judged, later each fourth
+
+// With multipliers of (C x − s = 0, G x = 0):  min ½ |s|² + ½ μ² |x|² − bᵀx. (2)
+class ShiftedInverse {
+ public:
+  ShiftedInverse(const SparseLu::Matrix& C_transposed, const SparseLu::Matrix& G_transposed)
+      : n_(C_transposed.rows()), size_(n_ + C_transposed.cols()) {
+    const double shift = kShift * LongestColumn(C_transposed);
+    std::vector<Eigen::Triplet<double>> weights, rows;
+    for (Eigen::Index i = 0; i < size_; ++i) {
+      weights.emplace_back(i, i, i < n_ ? shift * shift : 1.0);
+    }
+    ForEntries(C_transposed, [&](auto r, auto c) {
+      rows.emplace_back(r, c, C_transposed.valuePtr()[rows.size()]);
+    });
+    const auto entries = static_cast<Eigen::Index>(rows.size());
+    ForEntries(G_transposed, [&](auto r, auto c) {
+      const auto k = static_cast<Eigen::Index>(rows.size()) - entries;
+      rows.emplace_back(r, C_transposed.cols() + c, G_transposed.valuePtr()[k]);
+    });
+    for (Eigen::Index c = 0; c < C_transposed.cols(); ++c) rows.emplace_back(n_ + c, c, -1.0);
+    SparseLu::Matrix W(size_, size_), B(size_, C_transposed.cols() + G_transposed.cols());
+    W.setFromTriplets(weights.begin(), weights.end());
+    B.setFromTriplets(rows.begin(), rows.end());
+    good_ = saddle_.Factor(W, B, 0.0);
+    zero_.setZero(B.cols());
+  }
+  [[nodiscard]] bool good() const { return good_; }
+
+  [[nodiscard]] VecX operator()(const VecX& b) const {
+    VecX right = VecX::Zero(size_), x, y;
+    right.head(n_) = b;
+    saddle_.Solve(right, zero_, &x, &y);
+    return x.head(n_);
+  }
+
+ private:
+  Eigen::Index n_, size_;
+  SparseSaddle saddle_;
+  VecX zero_;
+  bool good_ = false;
+};
+
+// A share in every direction.
+VecX AnyVector(Eigen::Index size) {
+  std::mt19937_64 random(20261130);
+  VecX x(size);
+  for (double& entry : x) entry = std::ldexp(static_cast<double>(random() >> 11), -52) - 1.0;
+  return x;
+}
+
+}  // namespace
+
+SingularPair LeastSingular(const SparseLu::Matrix& C_transposed,
+                           const SparseLu::Matrix& G_transposed,
+                           const std::function<void(VecX*)>& project) {
+  SingularPair least;
+  const ShiftedInverse inverse(C_transposed, G_transposed);
+  if (!inverse.good()) return least;
+  const auto apply = [&](const VecX& b) {
+    VecX x = inverse(b);
+    if (project) project(&x);
+    return x;
+  };
+  std::vector<VecX> basis = {apply(apply(AnyVector(C_transposed.rows()))).normalized()};
+  std::vector<double> diagonal, beside;
+  VecX shares;  // of the basis in the vector of the largest eigenvalue
+  for (int step = 0; step < kMostLanczos && !least.converged; ++step) {
+    VecX next = apply(basis.back());
+    if (!next.allFinite()) return least;
+    diagonal.push_back(next.dot(basis.back()));
+    for (int again = 0; again < 2; ++again) {
+      for (const VecX& q : basis) next -= next.dot(q) * q;
+    }
+    beside.push_back(next.norm());
+    const bool last = step + 1 == kMostLanczos || !(beside.back() > kEps * diagonal.front());
+    if (last || step < kOftenLanczos || step % 4 == 0) {
+      const auto size = static_cast<Eigen::Index>(diagonal.size());
+      Eigen::SelfAdjointEigenSolver<MatX> ritz;
+      ritz.computeFromTridiagonal(Eigen::Map<const VecX>(diagonal.data(), size),
+                                  Eigen::Map<const VecX>(beside.data(), size - 1));
+      shares = ritz.eigenvectors().col(size - 1);
+      const double largest = ritz.eigenvalues()[size - 1];
+      const double residual = beside.back() * std::abs(shares[size - 1]);
+      const double gap = size < 2 ? 0.0 : largest - ritz.eigenvalues()[size - 2] - residual;
+      const double error = gap > 0.0 ? std::min(residual, residual * residual / gap) : residual;
+      least.converged = error <= kRitz * largest || !(beside.back() > kEps * largest);
+    }
+    if (last) break;
+    if (!least.converged) basis.push_back(next / beside.back());
+  }
+  least.vector.setZero(C_transposed.rows());
+  for (Eigen::Index k = 0; k < shares.size(); ++k) {
+    least.vector += shares[k] * basis[static_cast<size_t>(k)];
+  }
+  // Once more: what the iteration leaves of large singular values counts most in the value.
+  least.vector = apply(least.vector).normalized();
+  least.value = (C_transposed.transpose() * least.vector).norm();
+  return least;
 }
 
 }  // namespace mbv

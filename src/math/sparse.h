@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -142,5 +143,22 @@ class SparseLeastNorm {
   mutable VecX x_, y_;
   SparseSaddle saddle_;
 };
+
+/// [A; B; …], each given as its transpose: columns side by side.
+[[nodiscard]] SparseLu::Matrix SideBySide(const std::vector<const SparseLu::Matrix*>& parts);
+
+/// A singular value with its right vector, of unit length.
+struct SingularPair {
+  double value = kNan;
+  VecX vector;
+  bool converged = false;  ///< to about 1e-10 of the value
+};
+/// The least singular value that C has where G x = 0, by Lanczos' iteration on the inverse
+/// [Golub and Van Loan 2013, §10.1]. C and G are given as their transposes; the rows of G are
+/// independent of each other. `project`, where given, takes out of vectors, orthogonally, what
+/// singular vectors span that are not meant. NaN where the factors fail.
+[[nodiscard]] SingularPair LeastSingular(
+    const SparseLu::Matrix& C_transposed, const SparseLu::Matrix& G_transposed,
+    const std::function<void(VecX*)>& project = nullptr);
 
 }  // namespace mbv
