@@ -269,7 +269,8 @@ VecX ClosureResidual(const Mechanism& mechanism, const TreeMotion& tree, const B
 
 namespace {
 
-// More columns, and fewer entries than this share, are worth sparse factors.
+// More columns, and fewer entries than this share, are worth sparse factors; these need some
+// damping.
 constexpr Eigen::Index kMostDense = 300;
 constexpr double kSparse = 0.1;
 

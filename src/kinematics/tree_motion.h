@@ -87,8 +87,7 @@ namespace mbv::internal {
                                    const BodyStates& states, double length, MatX* J);
 
 /// s that makes |r + J s|² + μ |s|² least, by QR of the stacked matrix [J; √μ 1]: that keeps full
-/// accuracy as μ → 0 and tolerates redundant rows and free motions alike. Large J that are sparse:
-/// by sparse factors, with μ not below 1e-12.
+/// accuracy as μ → 0 and tolerates redundant rows and free motions alike.
 [[nodiscard]] VecX DampedStep(const MatX& J, const VecX& r, double mu);
 
 }  // namespace mbv::internal

@@ -48,20 +48,25 @@ struct SparseLu::Factors {
     Analysis(const Analysis&) = delete;
     Analysis& operator=(const Analysis&) = delete;
 
-    [[nodiscard]] bool IsOf(std::span<const int> other_columns,
-                            std::span<const int> other_rows) const {
-      return std::ranges::equal(columns, other_columns) && std::ranges::equal(rows, other_rows);
+    [[nodiscard]] bool IsOf(std::span<const int> other_columns, std::span<const int> other_rows,
+                            size_t other_ordering) const {
+      return ordering == other_ordering && std::ranges::equal(columns, other_columns) &&
+             std::ranges::equal(rows, other_rows);
     }
 
     std::vector<int> columns, rows;
+    size_t ordering = 0;
     klu_symbolic* symbolic = nullptr;
   };
 
-  Factors() {
+  explicit Factors(Pivots pivots) {
     klu_defaults(&common);
-    common.tol = kPivotTolerance;
-    common.ordering = 1;  // COLAMD: AMD of A + Aᵀ fills nets of loops ten times as much
-    common.scale = -1;    // rows and columns come in units that suit them
+    const bool diagonal = pivots == Pivots::kDiagonal;
+    common.tol = diagonal ? 0.0 : kPivotTolerance;
+    // AMD of A + Aᵀ, or COLAMD: where pivots move, the former fills nets of loops ten times as
+    // much.
+    common.ordering = diagonal ? 0 : 1;
+    common.scale = -1;  // rows and columns come in units that suit them
   }
   ~Factors() { Clear(); }
   Factors(const Factors&) = delete;
@@ -77,13 +82,15 @@ struct SparseLu::Factors {
     thread_local size_t next = 0;
     const std::span<const int> starts(columns, static_cast<size_t>(n) + 1);
     const std::span<const int> places(rows, static_cast<size_t>(columns[n]));
+    const auto ordering = static_cast<size_t>(common.ordering);
     for (const auto& one : known) {
-      if (one != nullptr && one->IsOf(starts, places)) analysis = one;
+      if (one != nullptr && one->IsOf(starts, places, ordering)) analysis = one;
     }
     if (analysis == nullptr) {
       analysis = std::make_shared<Analysis>();
       analysis->columns.assign(starts.begin(), starts.end());
       analysis->rows.assign(places.begin(), places.end());
+      analysis->ordering = ordering;
       analysis->symbolic = klu_analyze(n, columns, rows, &common);
       known[next++ % known.size()] = analysis;
     }
@@ -123,7 +130,7 @@ struct SparseLu::Factors {
   std::vector<char> seen;
 };
 
-SparseLu::SparseLu() : factors_(std::make_unique<Factors>()) {}
+SparseLu::SparseLu(Pivots pivots) : factors_(std::make_unique<Factors>(pivots)) {}
 SparseLu::~SparseLu() = default;
 SparseLu::SparseLu(SparseLu&&) noexcept = default;
 SparseLu& SparseLu::operator=(SparseLu&&) noexcept = default;
@@ -161,6 +168,12 @@ double SparseLu::PivotRatio() const {
   MBV_DEMAND(factors_->numeric != nullptr, factors_->n);
   const auto sizes = Eigen::Map<const VecX>(factors_->pivots(), factors_->n).cwiseAbs();
   return sizes.minCoeff() / sizes.maxCoeff();
+}
+
+double SparseLu::entries() const {
+  const Factors& f = *factors_;
+  if (f.numeric == nullptr) return 0.0;
+  return static_cast<double>(f.numeric->lnz) + static_cast<double>(f.numeric->unz);
 }
 
 void SparseLu::Solve(VecX* b) const {
@@ -453,6 +466,17 @@ void SparseSaddle::Solve(const VecX& c, const VecX& b, VecX* x, VecX* y, int ref
   *y = both_.tail(b.size());
 }
 
+namespace {
+
+// A Aᵀ of fewer rows is not tried; it is taken where its factors are smaller by this.
+constexpr Eigen::Index kFewRows = 50;
+constexpr double kMuchSmaller = 2.0;
+// Pivots of A Aᵀ: the rounding that its solutions have is their ratio's inverse, and squared by one
+// refinement.
+constexpr double kWellConditioned = 1e-8;
+
+}  // namespace
+
 void SparseLeastNorm::MakePattern(const SparseLu::Matrix& A) {
   weight_.resize(A.cols(), A.cols());
   weight_.setIdentity();
@@ -463,24 +487,87 @@ void SparseLeastNorm::MakePattern(const SparseLu::Matrix& A) {
   for (int k = 0; k < A.nonZeros(); ++k) places.valuePtr()[k] = k;
   A_ = places.transpose();
   from_.assign(A_.valuePtr(), A_.valuePtr() + A_.nonZeros());
+  way_ = A.rows() > kFewRows ? Way::kUndecided : Way::kSaddle;
+  normal_.Reset();
+  if (way_ == Way::kSaddle) return;
+  SparseLu::Matrix ones = A;  // nothing cancels
+  std::fill_n(ones.valuePtr(), ones.nonZeros(), 1.0);
+  squares_ = ones * SparseLu::Matrix(ones.transpose());
+  squares_.makeCompressed();
+  column_.setZero(A.rows());
+}
+
+bool SparseLeastNorm::FactorNormal(const SparseLu::Matrix& A) {
+  double* out = squares_.valuePtr();
+  for (Eigen::Index j = 0; j < squares_.cols(); ++j) {
+    for (SparseLu::Matrix::InnerIterator along(A_, j); along; ++along) {
+      for (SparseLu::Matrix::InnerIterator entry(A, along.row()); entry; ++entry) {
+        column_[entry.row()] += entry.value() * along.value();
+      }
+    }
+    for (SparseLu::Matrix::InnerIterator entry(squares_, j); entry; ++entry) {
+      *out++ = column_[entry.row()];
+      column_[entry.row()] = 0.0;
+    }
+  }
+  return normal_.Factor(squares_) && normal_.PivotRatio() > kWellConditioned;
 }
 
 bool SparseLeastNorm::Factor(const SparseLu::Matrix& A, double tolerance) {
   if (weight_.cols() != A.cols() || A_.nonZeros() != A.nonZeros()) MakePattern(A);
   double* values = A_.valuePtr();
   for (const int from : from_) *values++ = A.valuePtr()[from];
-  return saddle_.Factor(weight_, A_, tolerance);
+  if (way_ == Way::kNormal && FactorNormal(A)) return true;
+  const bool good = saddle_.Factor(weight_, A_, tolerance);
+  if (way_ == Way::kSaddle) return good;
+  const bool decide = way_ == Way::kUndecided;
+  way_ = Way::kSaddle;
+  if (decide && good && FactorNormal(A) && kMuchSmaller * normal_.entries() < saddle_.entries()) {
+    way_ = Way::kNormal;
+    saddle_.Reset();
+  }
+  return good;
+}
+
+// As SparseSaddle, with W = 1: y = (A Aᵀ)⁻¹(b − A c), x = c + Aᵀ y.
+void SparseLeastNorm::SolveNormal(const VecX& c, const VecX& b, VecX* x, VecX* y,
+                                  int refinements) const {
+  rest_c_ = c;
+  rest_b_ = b;
+  x->setZero(c.size());
+  y->setZero(b.size());
+  const int most = std::max(refinements, 1);
+  for (int i = 0;; ++i) {
+    rest_b_.noalias() -= A_.transpose() * rest_c_;
+    normal_.Solve(&rest_b_);
+    *y += rest_b_;
+    rest_c_.noalias() += A_ * rest_b_;
+    *x += rest_c_;
+    if (i == most) break;
+    rest_c_ = c - *x;
+    rest_c_.noalias() += A_ * *y;
+    rest_b_ = b;
+    rest_b_.noalias() -= A_.transpose() * *x;
+  }
 }
 
 VecX SparseLeastNorm::LeastNorm(const VecX& b) const {
   VecX x;
-  saddle_.Solve(zero_cols_, b, &x, &y_);
+  if (way_ == Way::kNormal) {
+    SolveNormal(zero_cols_, b, &x, &y_, 1);
+  } else {
+    saddle_.Solve(zero_cols_, b, &x, &y_);
+  }
   return x;
 }
 
 VecX SparseLeastNorm::LeastSquares(const VecX& c, int refinements) const {
   VecX y;
-  saddle_.Solve(c, zero_rows_, &x_, &y, refinements);
+  if (way_ == Way::kNormal) {
+    SolveNormal(c, zero_rows_, &x_, &y, refinements);
+  } else {
+    saddle_.Solve(c, zero_rows_, &x_, &y, refinements);
+  }
   return -y;
 }
 

@@ -281,6 +281,30 @@ TEST(SparseFactors, OfNetsSolveAsDenseOnes) {
   EXPECT_LT((least.LeastNorm(b) - dense).norm(), 1e-11 * dense.norm());
 }
 
+// Wide ones by A Aᵀ, whose condition is the square of A's.
+TEST(SparseFactors, OfWideNetsSolveAsDenseOnes) {
+  SparseLu::Matrix A = ForcesOfNet(9);
+  VecX b(A.rows()), c(A.cols());
+  for (Eigen::Index k = 0; k < b.size(); ++k) b[k] = std::sin(1.7 * static_cast<double>(k));
+  for (Eigen::Index k = 0; k < c.size(); ++k) c[k] = std::cos(0.9 * static_cast<double>(k));
+  SparseLeastNorm least;
+  for (const double weakest : {1.0, 1e-3, 1e-2}) {  // of an equation, against before
+    for (Eigen::Index k = 0; k < A.cols(); ++k) {
+      for (SparseLu::Matrix::InnerIterator entry(A, k); entry; ++entry) {
+        if (entry.row() == 7) entry.valueRef() *= weakest;
+      }
+    }
+    ASSERT_TRUE(least.Factor(A, 0.0));
+    const MatX dense(A);
+    const VecX x = dense.completeOrthogonalDecomposition().solve(b);
+    EXPECT_LT((least.LeastNorm(b) - x).norm(), 1e-11 * x.norm()) << weakest;
+    const VecX y = MatX(dense.transpose()).completeOrthogonalDecomposition().solve(c);
+    for (const int refinements : {0, 1}) {
+      EXPECT_LT((least.LeastSquares(c, refinements) - y).norm(), 1e-10 * y.norm()) << weakest;
+    }
+  }
+}
+
 // Of C where G x = 0, dense: all of them, and the vectors.
 Eigen::JacobiSVD<MatX> DenseUnder(const MatX& C, const MatX& G) {
   const Eigen::FullPivLU<MatX> lu(G);
