@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
+#include "kinematics/row_stack.h"
 #include "kinematics/tree_motion.h"
+#include "math/sparse.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/reach.h"
 
@@ -79,6 +82,30 @@ std::vector<Command> WhatIsAsked(const Mechanism& m, const Motion& motion) {
   return commands;
 }
 
+// Columns of unit length; what is zero stays.
+SparseLu::Matrix OfUnitLength(SparseLu::Matrix columns) {
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    const double length = columns.col(c).norm();
+    if (length == 0.0) continue;
+    for (SparseLu::Matrix::InnerIterator entry(columns, c); entry; ++entry) {
+      entry.valueRef() /= length;
+    }
+  }
+  return columns;
+}
+
+SparseLu::Matrix Chosen(const SparseLu::Matrix& columns, const std::vector<int>& which) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (size_t k = 0; k < which.size(); ++k) {
+    for (SparseLu::Matrix::InnerIterator entry(columns, which[k]); entry; ++entry) {
+      entries.emplace_back(entry.row(), static_cast<int>(k), entry.value());
+    }
+  }
+  SparseLu::Matrix some(columns.rows(), static_cast<Eigen::Index>(which.size()));
+  some.setFromTriplets(entries.begin(), entries.end());
+  return some;
+}
+
 }  // namespace
 
 const char* ToText(SingularityKind kind) {
@@ -110,14 +137,17 @@ struct SingularityMeter::Impl {
     }
   }
 
+  // Of a term in a command's row: angles count by the length.
+  [[nodiscard]] double ScaleOf(const Command::Term& term) const {
+    return (IsLength(m, term.coordinate) ? 1.0 : length) * term.factor;
+  }
   [[nodiscard]] MatX Rates(const std::vector<Command>& commands, const BodyStates& states,
                            const MatX& J) const {
     MatX C = MatX::Zero(static_cast<Eigen::Index>(commands.size()), J.cols());
     for (size_t k = 0; k < commands.size(); ++k) {
       for (const Command::Term& term : commands[k].terms) {
-        const double scale = IsLength(m, term.coordinate) ? 1.0 : length;
         C.row(static_cast<Eigen::Index>(k)) +=
-            scale * term.factor * internal::RowAlong(CoordinateRow(m, term.coordinate, states), J);
+            ScaleOf(term) * internal::RowAlong(CoordinateRow(m, term.coordinate, states), J);
       }
     }
     return C;
@@ -155,20 +185,24 @@ struct SingularityMeter::Impl {
     return here;
   }
 
-  // Moves most.
-  [[nodiscard]] int Body(const Here& here, const VecX& y) const {
-    const VecX twists = here.J * here.metric.matrixU().solve(y);
+  // Moves most, by the twists of the bodies.
+  template <typename TwistOf>
+  [[nodiscard]] int MovesMost(const TwistOf& twist_of) const {
     int most = -1;
     double largest = 0.0;
     for (size_t b = 1; b < m.bodies.size(); ++b) {
-      const auto at = 6 * static_cast<Eigen::Index>(b);
-      const double speed =
-          std::hypot(length * twists.segment<3>(at).norm(), twists.segment<3>(at + 3).norm());
+      const Vec6 V = twist_of(b);
+      const double speed = std::hypot(length * V.head<3>().norm(), V.tail<3>().norm());
       if (!(speed > largest * (1.0 + 1e-9))) continue;
       largest = speed;
       most = static_cast<int>(b);
     }
     return most;
+  }
+  [[nodiscard]] int Body(const Here& here, const VecX& y) const {
+    const VecX twists = here.J * here.metric.matrixU().solve(y);
+    return MovesMost(
+        [&](size_t b) -> Vec6 { return twists.segment<6>(6 * static_cast<Eigen::Index>(b)); });
   }
   // Least rate of the commands in motions N; of more motions than commands can hold none.
   [[nodiscard]] Distance Least(const std::vector<Command>& commands, const BodyStates& states,
@@ -181,18 +215,180 @@ struct SingularityMeter::Impl {
     return {svd.singularValues()[n - 1], Body(here, N * svd.matrixV().col(n - 1))};
   }
 
+  // The same sparse: what (2) leaves free is never written down.
+
+  // Rows over y = [L ω; v_c] / √bodies of all moving bodies, |y| = V by (1); a row in each column.
+  class RowsByBodies {
+   public:
+    RowsByBodies(const Mechanism& m, const std::vector<Vec3>& centres, const BodyStates& states,
+                 double length)
+        : length_(length), root_(std::sqrt(static_cast<double>(m.bodies.size()) - 1.0)) {
+      for (size_t b = 0; b < centres.size(); ++b)
+        c_.push_back(states.X_WB[b].linear() * centres[b]);
+    }
+
+    void Begin() { ++count_; }
+    void Add(int body, const Vec6& J, double scale) {
+      if (body == 0) return;
+      Vec6 entry = scale * root_ * J;  // of v_Bo = v_c − ω × c
+      const Vec3 f = entry.tail<3>();
+      entry.head<3>() = (entry.head<3>() - c_[static_cast<size_t>(body)].cross(f)) / length_;
+      for (int k = 0; k < 6; ++k) {
+        if (entry[k] != 0.0) entries_.emplace_back(6 * (body - 1) + k, count_ - 1, entry[k]);
+      }
+    }
+    void Add(const ScalarRow& row, double scale) {
+      Add(row.parent, row.J_parent, scale);
+      Add(row.child, row.J_child, scale);
+    }
+    void Add(const ConstraintRows& rows) {
+      for (int i = 0; i < rows.rows; ++i) {
+        Begin();
+        const double scale = i < rows.translation_rows ? 1.0 : length_;
+        Add(rows.parent, rows.J_parent.row(i), scale);
+        Add(rows.child, rows.J_child.row(i), scale);
+      }
+    }
+    [[nodiscard]] SparseLu::Matrix Columns() const {
+      SparseLu::Matrix columns(6 * (static_cast<Eigen::Index>(c_.size()) - 1), count_);
+      columns.setFromTriplets(entries_.begin(), entries_.end());
+      return columns;
+    }
+    // Twists [ω; v_Bo] of a body.
+    [[nodiscard]] Vec6 Twist(const VecX& y, size_t body) const {
+      Vec6 V = root_ * y.segment<6>(6 * (static_cast<Eigen::Index>(body) - 1));
+      V.head<3>() /= length_;
+      V.tail<3>() -= V.head<3>().cross(c_[body]);
+      return V;
+    }
+
+   private:
+    double length_, root_;
+    std::vector<Vec3> c_;
+    std::vector<Eigen::Triplet<double>> entries_;
+    int count_ = 0;
+  };
+
+  struct SparseHere {
+    RowsByBodies of_tree;
+    SparseLu::Matrix tree, loops, held;  // held: rows of both that span all, of unit length
+    SparseLeastNorm motions;             // factors of the rows held
+  };
+  [[nodiscard]] RowsByBodies NoRows(const BodyStates& states) const {
+    return {m, centres, states, length};
+  }
+  [[nodiscard]] SparseHere PlaceSparse(const BodyStates& states) const {
+    SparseHere here{.of_tree = NoRows(states), .tree = {}, .loops = {}, .held = {}, .motions = {}};
+    RowsByBodies of_loops = NoRows(states);
+    for (const Joint& joint : m.joints) {
+      (joint.closure ? of_loops : here.of_tree).Add(RowsOf(joint, states, false, false));
+    }
+    for (const CouplingRow& coupling : CouplingRows(m, states)) {
+      of_loops.Begin();
+      for (const ScalarRow& piece : coupling.pieces) {
+        of_loops.Add(piece, coupling.angular ? length : 1.0);
+      }
+    }
+    for (const Spin& spin : spins) {
+      of_loops.Begin();
+      of_loops.Add(IdleRow(spin, states), length);
+    }
+    here.tree = OfUnitLength(here.of_tree.Columns());
+    here.loops = of_loops.Columns();
+    return here;
+  }
+  [[nodiscard]] static SparseLu::Matrix AllRows(const SparseHere& here) {
+    return OfUnitLength(SideBySide({&here.tree, &here.loops}));
+  }
+  // Of all rows at a pose. Poses of simulations close to 1e-8 or so.
+  [[nodiscard]] static SparseRank RankOf(const SparseHere& here) {
+    SparseRank ranks(AllRows(here), internal::kRankTolerance);
+    return ranks.clear() ? ranks : SparseRank(AllRows(here), kLost);
+  }
+  // Factors the rows that the meter holds, or others of the pose. False where (2) is singular.
+  [[nodiscard]] bool Hold(SparseHere* here) const {
+    constexpr double kLeastPivot = 1e-11;  // about the square of a singular value
+    const SparseLu::Matrix all = AllRows(*here);
+    const auto factor = [&](const std::vector<int>& rows) {
+      here->held = Chosen(all, rows);
+      here->motions.Reset();
+      return here->motions.Factor(SparseLu::Matrix(here->held.transpose()), kLeastPivot);
+    };
+    if (factor(held_rows)) return true;
+    const SparseRank ranks = RankOf(*here);
+    return ranks.rank() == static_cast<int>(held_rows.size()) && factor(ranks.FirmlyIndependent());
+  }
+  [[nodiscard]] std::optional<Distance> Judged(const SparseHere& here,
+                                               const SingularPair& pair) const {
+    if (!pair.converged) return std::nullopt;
+    return Distance{pair.value,
+                    MovesMost([&](size_t b) { return here.of_tree.Twist(pair.vector, b); })};
+  }
+  // Nothing where factors fail: then the dense matrices decide.
+  [[nodiscard]] std::optional<Distance> LeastSparse(const std::vector<Command>& commands,
+                                                    const BodyStates& states,
+                                                    const SparseHere& here) const {
+    const Eigen::Index n = tree.dofs() - rank;
+    if (n == 0 || static_cast<Eigen::Index>(commands.size()) < n) return Distance{};
+    RowsByBodies rates = NoRows(states);
+    for (const Command& command : commands) {
+      rates.Begin();
+      for (const Command::Term& term : command.terms) {
+        rates.Add(CoordinateRow(m, term.coordinate, states), ScaleOf(term));
+      }
+    }
+    return Judged(here, LeastSingular(rates.Columns(), here.held));
+  }
+  [[nodiscard]] std::optional<Distance> LeastOfLoops(const SparseHere& here) const {
+    const auto without_motions = [&](VecX* y) { *y = here.held * here.motions.LeastSquares(*y); };
+    return Judged(here, LeastSingular(here.loops, here.tree, without_motions));
+  }
+  // By SingularityKind.
+  [[nodiscard]] std::optional<std::vector<Distance>> SparseAt(const BodyStates& states) const {
+    SparseHere here = PlaceSparse(states);
+    if (!Hold(&here)) return {};
+    std::vector<std::optional<Distance>> found(kKinds, Distance{});
+    found[0] = LeastSparse(asked, states, here);
+    if (holds) found[1] = LeastSparse(driven, states, here);
+    if (rank > 0) found[2] = LeastOfLoops(here);
+    std::vector<Distance> distances;
+    for (const std::optional<Distance>& one : found) {
+      if (!one) return {};
+      distances.push_back(*one);
+    }
+    return distances;
+  }
+  // The rank, rows of as many, and whether the drives hold every motion.
+  void FindRows(const std::vector<BodyStates>& some) {
+    std::optional<SparseRank> most;
+    for (const BodyStates& states : some) {
+      SparseRank ranks = RankOf(PlaceSparse(states));
+      if (!most || ranks.rank() > most->rank()) most = std::move(ranks);
+    }
+    held_rows = most->FirmlyIndependent();
+    rank = most->rank() - PlaceSparse(some.front()).tree.cols();
+    for (const BodyStates& states : some) {
+      SparseHere here = PlaceSparse(states);
+      if (!Hold(&here)) continue;
+      const std::optional<Distance> forward = LeastSparse(driven, states, here);
+      holds = forward && forward->value > kLost;
+      if (holds) break;
+    }
+  }
+
   const Mechanism& m;
   std::vector<Command> asked, driven;
   double length;
   internal::TreeMotion tree;
   std::vector<Spin> spins;
   std::vector<Vec3> centres;
-  Eigen::Index rank = 0;  // of (2), where it is regular
-  bool holds = false;     // the drives hold every motion somewhere
+  Eigen::Index rank = 0;       // of (2), where it is regular
+  bool holds = false;          // the drives hold every motion somewhere
+  std::vector<int> held_rows;  // of tree and loops, that span all; sparse only
 };
 
 SingularityMeter::SingularityMeter(const Mechanism& mechanism, const std::vector<Command>& x,
-                                   const std::vector<std::vector<Pose>>& poses)
+                                   const std::vector<std::vector<Pose>>& poses, int most_dense)
     : impl_(std::make_unique<Impl>(mechanism, x)) {
   std::vector<BodyStates> some = {StatesAt(mechanism.X_WB_home)};
   const size_t count = std::min(kRankPoses, poses.size());
@@ -200,6 +396,10 @@ SingularityMeter::SingularityMeter(const Mechanism& mechanism, const std::vector
     some.push_back(StatesAt(poses[(2 * k + 1) * poses.size() / (2 * count)]));
   }
   if (impl_->tree.dofs() == 0) return;
+  if (impl_->tree.dofs() > most_dense) {
+    impl_->FindRows(some);
+    return;
+  }
   for (const BodyStates& states : some) {
     const Impl::Here here = impl_->Place(states);
     const double least = kLost * here.sigma.maxCoeff();
@@ -217,6 +417,9 @@ double SingularityMeter::length() const { return impl_->length; }
 std::vector<SingularityMeter::Distance> SingularityMeter::At(const BodyStates& states) const {
   std::vector<Distance> distances(kKinds);
   if (impl_->tree.dofs() == 0) return distances;
+  if (!impl_->held_rows.empty()) {
+    if (auto sparse = impl_->SparseAt(states)) return *std::move(sparse);
+  }
   const Impl::Here here = impl_->Place(states);
   distances[0] = impl_->Least(impl_->asked, states, here);
   if (impl_->holds) distances[1] = impl_->Least(impl_->driven, states, here);

@@ -30,12 +30,16 @@ enum class SingularityKind { kInverse, kForward, kConstraint };
 /// its size, and bodies answer an error or a clearance of the drives as strongly.
 inline constexpr double kCloseToSingular = 0.02;
 
+/// Rates of the spanning tree up to which matrices are dense. Of more they are sparse, over the
+/// rates of all bodies, and give the same distances.
+inline constexpr int kMostDenseRates = 300;
+
 class SingularityMeter {
  public:
   /// `x` are the coordinates of (3). The rank of (2) and (4) is the largest at home and at
   /// `poses`, a few of which are looked at. The mechanism outlives it.
   SingularityMeter(const Mechanism& mechanism, const std::vector<Command>& x,
-                   const std::vector<std::vector<Pose>>& poses);
+                   const std::vector<std::vector<Pose>>& poses, int most_dense = kMostDenseRates);
   ~SingularityMeter();
 
   struct Distance {

@@ -3,8 +3,10 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "kinematics/constraints.h"
+#include "math/sparse.h"
 #include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/motion.h"
@@ -265,7 +267,42 @@ VecX ClosureResidual(const Mechanism& mechanism, const TreeMotion& tree, const B
   return r;
 }
 
+namespace {
+
+// More columns, and fewer entries than this share, are worth sparse factors; these need some
+// damping.
+constexpr Eigen::Index kMostDense = 300;
+constexpr double kSparse = 0.1;
+
+// With e = r + J s: least ½ μ |s|² + ½ |e|² where J s − e = −r.
+std::optional<VecX> SparseDampedStep(const MatX& J, const VecX& r, double mu) {
+  constexpr double kLeastDamping = 1e-12;
+  const Eigen::Index n = J.cols(), size = n + J.rows();
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index c = 0; c < n; ++c) {
+    for (Eigen::Index i = 0; i < J.rows(); ++i) {
+      if (J(i, c) != 0.0) entries.emplace_back(c, i, J(i, c));
+    }
+  }
+  if (static_cast<double>(entries.size()) > kSparse * static_cast<double>(J.size())) return {};
+  for (Eigen::Index i = 0; i < J.rows(); ++i) entries.emplace_back(n + i, i, -1.0);
+  SparseLu::Matrix B(size, J.rows()), W(size, size);
+  B.setFromTriplets(entries.begin(), entries.end());
+  W.setIdentity();
+  for (Eigen::Index c = 0; c < n; ++c) W.valuePtr()[c] = std::max(mu, kLeastDamping);
+  SparseSaddle saddle;
+  if (!saddle.Factor(W, B, 0.0)) return {};
+  VecX x, y;
+  saddle.Solve(VecX::Zero(size), -r, &x, &y);
+  return x.allFinite() ? std::optional<VecX>(x.head(n)) : std::nullopt;
+}
+
+}  // namespace
+
 VecX DampedStep(const MatX& J, const VecX& r, double mu) {
+  if (J.cols() > kMostDense) {
+    if (std::optional<VecX> s = SparseDampedStep(J, r, mu)) return *std::move(s);
+  }
   MatX stacked(J.rows() + J.cols(), J.cols());
   stacked << J, std::sqrt(mu) * MatX::Identity(J.cols(), J.cols());
   VecX right = VecX::Zero(stacked.rows());

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -47,20 +48,25 @@ struct SparseLu::Factors {
     Analysis(const Analysis&) = delete;
     Analysis& operator=(const Analysis&) = delete;
 
-    [[nodiscard]] bool IsOf(std::span<const int> other_columns,
-                            std::span<const int> other_rows) const {
-      return std::ranges::equal(columns, other_columns) && std::ranges::equal(rows, other_rows);
+    [[nodiscard]] bool IsOf(std::span<const int> other_columns, std::span<const int> other_rows,
+                            size_t other_ordering) const {
+      return ordering == other_ordering && std::ranges::equal(columns, other_columns) &&
+             std::ranges::equal(rows, other_rows);
     }
 
     std::vector<int> columns, rows;
+    size_t ordering = 0;
     klu_symbolic* symbolic = nullptr;
   };
 
-  Factors() {
+  explicit Factors(Pivots pivots) {
     klu_defaults(&common);
-    common.tol = kPivotTolerance;
-    common.ordering = 1;  // COLAMD: AMD of A + Aᵀ fills nets of loops ten times as much
-    common.scale = -1;    // rows and columns come in units that suit them
+    const bool diagonal = pivots == Pivots::kDiagonal;
+    common.tol = diagonal ? 0.0 : kPivotTolerance;
+    // AMD of A + Aᵀ, or COLAMD: where pivots move, the former fills nets of loops ten times as
+    // much.
+    common.ordering = diagonal ? 0 : 1;
+    common.scale = -1;  // rows and columns come in units that suit them
   }
   ~Factors() { Clear(); }
   Factors(const Factors&) = delete;
@@ -76,13 +82,15 @@ struct SparseLu::Factors {
     thread_local size_t next = 0;
     const std::span<const int> starts(columns, static_cast<size_t>(n) + 1);
     const std::span<const int> places(rows, static_cast<size_t>(columns[n]));
+    const auto ordering = static_cast<size_t>(common.ordering);
     for (const auto& one : known) {
-      if (one != nullptr && one->IsOf(starts, places)) analysis = one;
+      if (one != nullptr && one->IsOf(starts, places, ordering)) analysis = one;
     }
     if (analysis == nullptr) {
       analysis = std::make_shared<Analysis>();
       analysis->columns.assign(starts.begin(), starts.end());
       analysis->rows.assign(places.begin(), places.end());
+      analysis->ordering = ordering;
       analysis->symbolic = klu_analyze(n, columns, rows, &common);
       known[next++ % known.size()] = analysis;
     }
@@ -122,7 +130,7 @@ struct SparseLu::Factors {
   std::vector<char> seen;
 };
 
-SparseLu::SparseLu() : factors_(std::make_unique<Factors>()) {}
+SparseLu::SparseLu(Pivots pivots) : factors_(std::make_unique<Factors>(pivots)) {}
 SparseLu::~SparseLu() = default;
 SparseLu::SparseLu(SparseLu&&) noexcept = default;
 SparseLu& SparseLu::operator=(SparseLu&&) noexcept = default;
@@ -160,6 +168,12 @@ double SparseLu::PivotRatio() const {
   MBV_DEMAND(factors_->numeric != nullptr, factors_->n);
   const auto sizes = Eigen::Map<const VecX>(factors_->pivots(), factors_->n).cwiseAbs();
   return sizes.minCoeff() / sizes.maxCoeff();
+}
+
+double SparseLu::entries() const {
+  const Factors& f = *factors_;
+  if (f.numeric == nullptr) return 0.0;
+  return static_cast<double>(f.numeric->lnz) + static_cast<double>(f.numeric->unz);
 }
 
 void SparseLu::Solve(VecX* b) const {
@@ -452,6 +466,17 @@ void SparseSaddle::Solve(const VecX& c, const VecX& b, VecX* x, VecX* y, int ref
   *y = both_.tail(b.size());
 }
 
+namespace {
+
+// A Aᵀ of fewer rows is not tried; it is taken where its factors are smaller by this.
+constexpr Eigen::Index kFewRows = 50;
+constexpr double kMuchSmaller = 2.0;
+// Pivots of A Aᵀ: the rounding that its solutions have is their ratio's inverse, and squared by one
+// refinement.
+constexpr double kWellConditioned = 1e-8;
+
+}  // namespace
+
 void SparseLeastNorm::MakePattern(const SparseLu::Matrix& A) {
   weight_.resize(A.cols(), A.cols());
   weight_.setIdentity();
@@ -462,25 +487,217 @@ void SparseLeastNorm::MakePattern(const SparseLu::Matrix& A) {
   for (int k = 0; k < A.nonZeros(); ++k) places.valuePtr()[k] = k;
   A_ = places.transpose();
   from_.assign(A_.valuePtr(), A_.valuePtr() + A_.nonZeros());
+  way_ = A.rows() > kFewRows ? Way::kUndecided : Way::kSaddle;
+  normal_.Reset();
+  if (way_ == Way::kSaddle) return;
+  SparseLu::Matrix ones = A;  // nothing cancels
+  std::fill_n(ones.valuePtr(), ones.nonZeros(), 1.0);
+  squares_ = ones * SparseLu::Matrix(ones.transpose());
+  squares_.makeCompressed();
+  column_.setZero(A.rows());
+}
+
+bool SparseLeastNorm::FactorNormal(const SparseLu::Matrix& A) {
+  double* out = squares_.valuePtr();
+  for (Eigen::Index j = 0; j < squares_.cols(); ++j) {
+    for (SparseLu::Matrix::InnerIterator along(A_, j); along; ++along) {
+      for (SparseLu::Matrix::InnerIterator entry(A, along.row()); entry; ++entry) {
+        column_[entry.row()] += entry.value() * along.value();
+      }
+    }
+    for (SparseLu::Matrix::InnerIterator entry(squares_, j); entry; ++entry) {
+      *out++ = column_[entry.row()];
+      column_[entry.row()] = 0.0;
+    }
+  }
+  return normal_.Factor(squares_) && normal_.PivotRatio() > kWellConditioned;
 }
 
 bool SparseLeastNorm::Factor(const SparseLu::Matrix& A, double tolerance) {
   if (weight_.cols() != A.cols() || A_.nonZeros() != A.nonZeros()) MakePattern(A);
   double* values = A_.valuePtr();
   for (const int from : from_) *values++ = A.valuePtr()[from];
-  return saddle_.Factor(weight_, A_, tolerance);
+  if (way_ == Way::kNormal && FactorNormal(A)) return true;
+  const bool good = saddle_.Factor(weight_, A_, tolerance);
+  if (way_ == Way::kSaddle) return good;
+  const bool decide = way_ == Way::kUndecided;
+  way_ = Way::kSaddle;
+  if (decide && good && FactorNormal(A) && kMuchSmaller * normal_.entries() < saddle_.entries()) {
+    way_ = Way::kNormal;
+    saddle_.Reset();
+  }
+  return good;
+}
+
+// As SparseSaddle, with W = 1: y = (A Aᵀ)⁻¹(b − A c), x = c + Aᵀ y.
+void SparseLeastNorm::SolveNormal(const VecX& c, const VecX& b, VecX* x, VecX* y,
+                                  int refinements) const {
+  rest_c_ = c;
+  rest_b_ = b;
+  x->setZero(c.size());
+  y->setZero(b.size());
+  const int most = std::max(refinements, 1);
+  for (int i = 0;; ++i) {
+    rest_b_.noalias() -= A_.transpose() * rest_c_;
+    normal_.Solve(&rest_b_);
+    *y += rest_b_;
+    rest_c_.noalias() += A_ * rest_b_;
+    *x += rest_c_;
+    if (i == most) break;
+    rest_c_ = c - *x;
+    rest_c_.noalias() += A_ * *y;
+    rest_b_ = b;
+    rest_b_.noalias() -= A_.transpose() * *x;
+  }
 }
 
 VecX SparseLeastNorm::LeastNorm(const VecX& b) const {
   VecX x;
-  saddle_.Solve(zero_cols_, b, &x, &y_);
+  if (way_ == Way::kNormal) {
+    SolveNormal(zero_cols_, b, &x, &y_, 1);
+  } else {
+    saddle_.Solve(zero_cols_, b, &x, &y_);
+  }
   return x;
 }
 
 VecX SparseLeastNorm::LeastSquares(const VecX& c, int refinements) const {
   VecX y;
-  saddle_.Solve(c, zero_rows_, &x_, &y, refinements);
+  if (way_ == Way::kNormal) {
+    SolveNormal(c, zero_rows_, &x_, &y, refinements);
+  } else {
+    saddle_.Solve(c, zero_rows_, &x_, &y, refinements);
+  }
   return -y;
+}
+
+SparseLu::Matrix SideBySide(const std::vector<const SparseLu::Matrix*>& parts) {
+  Eigen::Index columns = 0, entries = 0;
+  for (const SparseLu::Matrix* part : parts) {
+    columns += part->cols();
+    entries += part->nonZeros();
+  }
+  SparseLu::Matrix all(parts.front()->rows(), columns);
+  all.reserve(entries);
+  Eigen::Index at = 0;
+  for (const SparseLu::Matrix* part : parts) {
+    for (Eigen::Index c = 0; c < part->cols(); ++c, ++at) {
+      all.startVec(at);
+      for (SparseLu::Matrix::InnerIterator entry(*part, c); entry; ++entry) {
+        all.insertBack(entry.row(), at) = entry.value();
+      }
+    }
+  }
+  all.finalize();
+  return all;
+}
+
+namespace {
+
+// Of the length of the longest row of C: what keeps the inverse finite where C loses a direction.
+// Singular values change by its square only, and not those of the vectors found.
+constexpr double kShift = 1e-5;
+constexpr double kRitz = 1e-10;  // error of an eigenvalue, of itself
+constexpr int kMostLanczos = 400;
+constexpr int kOftenLanczos = 12;  // until then each step is judged, later each fourth
+
+// With multipliers of (C x − s = 0, G x = 0):  min ½ |s|² + ½ μ² |x|² − bᵀx. (2)
+class ShiftedInverse {
+ public:
+  ShiftedInverse(const SparseLu::Matrix& C_transposed, const SparseLu::Matrix& G_transposed)
+      : n_(C_transposed.rows()), size_(n_ + C_transposed.cols()) {
+    const double shift = kShift * LongestColumn(C_transposed);
+    std::vector<Eigen::Triplet<double>> weights, rows;
+    for (Eigen::Index i = 0; i < size_; ++i) {
+      weights.emplace_back(i, i, i < n_ ? shift * shift : 1.0);
+    }
+    ForEntries(C_transposed, [&](auto r, auto c) {
+      rows.emplace_back(r, c, C_transposed.valuePtr()[rows.size()]);
+    });
+    const auto entries = static_cast<Eigen::Index>(rows.size());
+    ForEntries(G_transposed, [&](auto r, auto c) {
+      const auto k = static_cast<Eigen::Index>(rows.size()) - entries;
+      rows.emplace_back(r, C_transposed.cols() + c, G_transposed.valuePtr()[k]);
+    });
+    for (Eigen::Index c = 0; c < C_transposed.cols(); ++c) rows.emplace_back(n_ + c, c, -1.0);
+    SparseLu::Matrix W(size_, size_), B(size_, C_transposed.cols() + G_transposed.cols());
+    W.setFromTriplets(weights.begin(), weights.end());
+    B.setFromTriplets(rows.begin(), rows.end());
+    good_ = saddle_.Factor(W, B, 0.0);
+    zero_.setZero(B.cols());
+  }
+  [[nodiscard]] bool good() const { return good_; }
+
+  [[nodiscard]] VecX operator()(const VecX& b) const {
+    VecX right = VecX::Zero(size_), x, y;
+    right.head(n_) = b;
+    saddle_.Solve(right, zero_, &x, &y);
+    return x.head(n_);
+  }
+
+ private:
+  Eigen::Index n_, size_;
+  SparseSaddle saddle_;
+  VecX zero_;
+  bool good_ = false;
+};
+
+// A share in every direction.
+VecX AnyVector(Eigen::Index size) {
+  std::mt19937_64 random(20261130);
+  VecX x(size);
+  for (double& entry : x) entry = std::ldexp(static_cast<double>(random() >> 11), -52) - 1.0;
+  return x;
+}
+
+}  // namespace
+
+SingularPair LeastSingular(const SparseLu::Matrix& C_transposed,
+                           const SparseLu::Matrix& G_transposed,
+                           const std::function<void(VecX*)>& project) {
+  SingularPair least;
+  const ShiftedInverse inverse(C_transposed, G_transposed);
+  if (!inverse.good()) return least;
+  const auto apply = [&](const VecX& b) {
+    VecX x = inverse(b);
+    if (project) project(&x);
+    return x;
+  };
+  std::vector<VecX> basis = {apply(apply(AnyVector(C_transposed.rows()))).normalized()};
+  std::vector<double> diagonal, beside;
+  VecX shares;  // of the basis in the vector of the largest eigenvalue
+  for (int step = 0; step < kMostLanczos && !least.converged; ++step) {
+    VecX next = apply(basis.back());
+    if (!next.allFinite()) return least;
+    diagonal.push_back(next.dot(basis.back()));
+    for (int again = 0; again < 2; ++again) {
+      for (const VecX& q : basis) next -= next.dot(q) * q;
+    }
+    beside.push_back(next.norm());
+    const bool last = step + 1 == kMostLanczos || !(beside.back() > kEps * diagonal.front());
+    if (last || step < kOftenLanczos || step % 4 == 0) {
+      const auto size = static_cast<Eigen::Index>(diagonal.size());
+      Eigen::SelfAdjointEigenSolver<MatX> ritz;
+      ritz.computeFromTridiagonal(Eigen::Map<const VecX>(diagonal.data(), size),
+                                  Eigen::Map<const VecX>(beside.data(), size - 1));
+      shares = ritz.eigenvectors().col(size - 1);
+      const double largest = ritz.eigenvalues()[size - 1];
+      const double residual = beside.back() * std::abs(shares[size - 1]);
+      const double gap = size < 2 ? 0.0 : largest - ritz.eigenvalues()[size - 2] - residual;
+      const double error = gap > 0.0 ? std::min(residual, residual * residual / gap) : residual;
+      least.converged = error <= kRitz * largest || !(beside.back() > kEps * largest);
+    }
+    if (last) break;
+    if (!least.converged) basis.push_back(next / beside.back());
+  }
+  least.vector.setZero(C_transposed.rows());
+  for (Eigen::Index k = 0; k < shares.size(); ++k) {
+    least.vector += shares[k] * basis[static_cast<size_t>(k)];
+  }
+  // Once more: what the iteration leaves of large singular values counts most in the value.
+  least.vector = apply(least.vector).normalized();
+  least.value = (C_transposed.transpose() * least.vector).norm();
+  return least;
 }
 
 }  // namespace mbv

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -17,7 +18,11 @@ class SparseLu {
  public:
   using Matrix = Eigen::SparseMatrix<double>;  ///< compressed
 
-  SparseLu();
+  enum class Pivots {
+    kAny,       ///< rows that keep factors small and stable
+    kDiagonal,  ///< of positive definite matrices
+  };
+  explicit SparseLu(Pivots pivots = Pivots::kAny);
   ~SparseLu();
   SparseLu(SparseLu&&) noexcept;
   SparseLu& operator=(SparseLu&&) noexcept;
@@ -32,6 +37,8 @@ class SparseLu {
 
   /// Smallest over largest pivot: a cheap warning of a singular matrix.
   [[nodiscard]] double PivotRatio() const;
+  /// Of both factors, which is what they cost.
+  [[nodiscard]] double entries() const;
 
   /// In place: x with A x = b, and with Aᵀ x = b.
   void Solve(VecX* b) const;
@@ -108,6 +115,8 @@ class SparseSaddle {
   void Reset();
 
   void Solve(const VecX& c, const VecX& b, VecX* x, VecX* y, int refinements = 1) const;
+  /// Of the factors.
+  [[nodiscard]] double entries() const { return lu_.entries(); }
 
  private:
   void MakePattern(const Matrix& W, const Matrix& B_transposed);
@@ -120,7 +129,8 @@ class SparseSaddle {
 };
 
 /// For A of full row rank: x of least norm with A x = b, and y with least |Aᵀ y − c| [Björck 1996,
-/// §2.5.2].
+/// §2.5.2]. By the factors of SparseSaddle, or of A Aᵀ where these are much smaller, as of nets,
+/// and A is conditioned well enough that refinement makes up for the square.
 class SparseLeastNorm {
  public:
   /// As SparseSaddle::Factor(), with the same patterns since the last Reset().
@@ -128,6 +138,7 @@ class SparseLeastNorm {
   void Reset() {
     A_.resize(0, 0);
     saddle_.Reset();
+    normal_.Reset();
   }
 
   [[nodiscard]] VecX LeastNorm(const VecX& b) const;
@@ -135,12 +146,36 @@ class SparseLeastNorm {
 
  private:
   void MakePattern(const SparseLu::Matrix& A);
+  [[nodiscard]] bool FactorNormal(const SparseLu::Matrix& A);
+  void SolveNormal(const VecX& c, const VecX& b, VecX* x, VecX* y, int refinements) const;
 
+  enum class Way { kUndecided, kSaddle, kNormal };
+  Way way_ = Way::kSaddle;
   SparseLu::Matrix A_, weight_;  ///< Aᵀ, W
-  std::vector<int> from_;        ///< per entry of Aᵀ: which one of A
+  SparseLu::Matrix squares_;     ///< A Aᵀ
+  SparseLu normal_{SparseLu::Pivots::kDiagonal};
+  VecX column_;            ///< of squares_
+  std::vector<int> from_;  ///< per entry of Aᵀ: which one of A
   VecX zero_cols_, zero_rows_;
-  mutable VecX x_, y_;
+  mutable VecX x_, y_, rest_c_, rest_b_;
   SparseSaddle saddle_;
 };
+
+/// [A; B; …], each given as its transpose: columns side by side.
+[[nodiscard]] SparseLu::Matrix SideBySide(const std::vector<const SparseLu::Matrix*>& parts);
+
+/// A singular value with its right vector, of unit length.
+struct SingularPair {
+  double value = kNan;
+  VecX vector;
+  bool converged = false;  ///< to about 1e-10 of the value
+};
+/// The least singular value that C has where G x = 0, by Lanczos' iteration on the inverse
+/// [Golub and Van Loan 2013, §10.1]. C and G are given as their transposes; the rows of G are
+/// independent of each other. `project`, where given, takes out of vectors, orthogonally, what
+/// singular vectors span that are not meant. NaN where the factors fail.
+[[nodiscard]] SingularPair LeastSingular(const SparseLu::Matrix& C_transposed,
+                                         const SparseLu::Matrix& G_transposed,
+                                         const std::function<void(VecX*)>& project = nullptr);
 
 }  // namespace mbv

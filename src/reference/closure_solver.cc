@@ -11,6 +11,7 @@
 #include "base/demand.h"
 #include "kinematics/constraints.h"
 #include "kinematics/home.h"
+#include "math/sparse.h"
 #include "math/spatial.h"
 #include "mechanism/reach.h"
 #include "reference/force_solver.h"
@@ -540,7 +541,7 @@ constexpr DampingRule kDamping{.most_steps = 60,
                                .easier = 0.1,
                                .stronger = 10.0};
 
-// All joint rows and commands as a weighted dense least-squares problem, lengths per L.
+// All joint rows and commands as a weighted least-squares problem, lengths per L.
 class OpenLoops {
  public:
   OpenLoops(const Mechanism& mechanism, const std::vector<Command>& commands, const VecX& target,
@@ -618,6 +619,19 @@ class OpenLoops {
   double length_;
   bool any_closure_;
 };
+
+// The least singular value; of large matrices by sparse factors.
+SingularPair LeastOf(const MatX& J) {
+  constexpr Eigen::Index kMostDense = 300;
+  if (J.cols() > kMostDense) {
+    const SparseLu::Matrix rows = J.transpose().sparseView();
+    SingularPair least = LeastSingular(rows, SparseLu::Matrix(J.cols(), 0));
+    if (least.converged) return least;
+  }
+  const Eigen::BDCSVD<MatX> svd(J, Eigen::ComputeThinV);
+  const Eigen::Index last = svd.singularValues().size() - 1;
+  return {svd.singularValues()[last], svd.matrixV().col(last), true};
+}
 
 // The largest open joint, or the largest missed command where no loop can open.
 void NameWorst(const Mechanism& mechanism, const std::vector<Command>& commands,
@@ -700,12 +714,11 @@ RunSummary ExplainUnreached(const Mechanism& mechanism, const std::vector<Comman
   }
   MatX J;
   (void)loops.Evaluate(nearest, false, &J);
-  const Eigen::BDCSVD<MatX> svd(J, Eigen::ComputeThinV);
-  const Eigen::Index last = svd.singularValues().size() - 1;
+  const SingularPair least = LeastOf(J);
   summary.stop = Stop::kSingular;
-  summary.where = MostMovingJoint(mechanism, nearest, loops.Unscaled(svd.matrixV().col(last)));
+  summary.where = MostMovingJoint(mechanism, nearest, loops.Unscaled(least.vector));
   summary.names_where = true;
-  summary.amount = svd.singularValues()[last];
+  summary.amount = least.value;
   summary.unit = "1";
   summary.message = fmt::format(
       "the commanded motion passes a singular pose near {} (smallest singular value {:.1e})",

@@ -5,10 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <limits>
 
+#include "kinematics/constraints.h"
 #include "kinematics/home.h"
 #include "mechanism/reach.h"
 #include "model_file/load_model.h"
+#include "tests/mechanisms/loop_shapes.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -182,6 +187,116 @@ TEST(Singularity, AMotionsNearestSampleIsFoundWithItsForces) {
       m, motion, time_s, {X_WB.begin(), X_WB.begin() + static_cast<std::ptrdiff_t>(half)}, &trace);
   EXPECT_FALSE(away.of[0].close());
   EXPECT_GT(away.of[0].distance, kCloseToSingular);
+}
+
+// Of dense matrices and of sparse ones, at the pose to which all joint drives lead from home.
+struct BothWays {
+  std::vector<SingularityMeter::Distance> dense, sparse;
+};
+
+Mechanism DrivenOn(const Mechanism& mechanism, double by) {
+  Mechanism moved = mechanism;
+  for (Joint& joint : moved.joints) joint.guess = joint.home;
+  for (const Drive& drive : moved.drives) {
+    if (const auto* on = std::get_if<JointDrive>(&drive.kind)) {
+      moved.joints[static_cast<size_t>(on->joint)].guess[static_cast<size_t>(on->coordinate)] += by;
+    }
+  }
+  SolveHome(&moved);
+  return moved;
+}
+
+// Of all coordinates but those driven: more than it takes.
+std::vector<Command> OthersOf(const Mechanism& m) {
+  std::vector<Command> commands;
+  for (const NamedCoordinate& named : NamedMotionCoordinates(m)) {
+    if (named.coordinate.kind == Coordinate::Kind::kDrive ||
+        named.coordinate.kind == Coordinate::Kind::kPrescribed) {
+      continue;
+    }
+    commands.push_back({named.name, {{named.coordinate, 1.0}}, {}});
+  }
+  return commands;
+}
+
+BothWays DistancesAt(const Mechanism& m, double by, const std::vector<Command>& x) {
+  const Mechanism moved = DrivenOn(m, by);
+  BodyStates states;
+  states.Resize(m.bodies.size());
+  states.X_WB = moved.X_WB_home;
+  FollowCouplings(m, &states);
+  const std::vector<std::vector<Pose>> beside = {DrivenOn(m, 0.013).X_WB_home};
+  const SingularityMeter dense(m, x, beside, std::numeric_limits<int>::max());
+  const SingularityMeter sparse(m, x, beside, 0);
+  return {dense.At(states), sparse.At(states)};
+}
+
+// Squares of singular values have the rounding of the largest, which is of the order one.
+double RoundingOf(double distance) { return 1e-9 * distance + 1e-14 / std::max(distance, 1e-8); }
+
+void ExpectSame(const BothWays& at, const std::string& where) {
+  for (size_t kind = 0; kind < 3; ++kind) {
+    const double dense = at.dense[kind].value, sparse = at.sparse[kind].value;
+    ASSERT_EQ(std::isnan(dense), std::isnan(sparse)) << where << " " << kind;
+    if (std::isnan(dense)) continue;
+    EXPECT_NEAR(sparse, dense, RoundingOf(dense)) << where << " " << kind;
+  }
+}
+
+TEST(SparseSingularity, DistancesAreThoseOfDenseMatricesForManyLoops) {
+  for (const std::string& text :
+       {ScissorLiftText(9), ScissorLiftText(5, true), StoreysText(5), StoreysText(3, true),
+        NetOfPlatesText(4), HexapodsText(2), LongLoopText(14), LongLoopText(11, true)}) {
+    const Mechanism m = MechanismOf(text);
+    for (const double by : {0.0, 0.02, -0.05}) {
+      ExpectSame(DistancesAt(m, by, OthersOf(m)), m.name + fmt::format(" {}", by));
+    }
+    // A pose beside it has other distances.
+    const BothWays here = DistancesAt(m, 0.02, {}), beside = DistancesAt(m, 0.02 + 1e-5, {});
+    EXPECT_GT(std::abs(beside.sparse[2].value - here.dense[2].value),
+              10 * RoundingOf(here.dense[2].value))
+        << m.name;
+  }
+}
+
+TEST(SparseSingularity, DistancesAreThoseOfDenseMatricesForShippedModels) {
+  int models = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
+    const LoadResult loaded = LoadModel((entry.path() / "model.yaml").string());
+    if (!loaded.mechanism) continue;
+    ++models;
+    ExpectSame(DistancesAt(*loaded.mechanism, 0.01, OthersOf(*loaded.mechanism)),
+               loaded.mechanism->name);
+  }
+  EXPECT_GE(models, 20);
+}
+
+TEST(SparseSingularity, DistancesAreThoseOfDenseMatricesNearSingularPoses) {
+  const auto at = [](const Mechanism& m, const std::vector<Command>& x, int most_dense,
+                     const Mechanism& beside) {
+    const SingularityMeter meter(m, x, {beside.X_WB_home}, most_dense);
+    BodyStates states;
+    states.Resize(m.bodies.size());
+    states.X_WB = m.X_WB_home;
+    return meter.At(states);
+  };
+  const int all = std::numeric_limits<int>::max();
+  for (const double from_singular : {1e-2, 1e-4, 1e-6, 0.0}) {
+    // The drives lose hold, the output loses a direction.
+    for (const bool slider_driven : {true, false}) {
+      const Mechanism m = SliderCrank(from_singular, slider_driven);
+      const Mechanism beside = SliderCrank(0.6, slider_driven);
+      const std::vector<Command> x = OfJoint(m, slider_driven ? "A" : "D");
+      ExpectSame({at(m, x, all, beside), at(m, x, 0, beside)}, m.name);
+    }
+    // Loops lose a constraint: at the very pose what moves has no meaning.
+    const Mechanism m = Parallelogram(from_singular), beside = Parallelogram(0.5);
+    const auto dense = at(m, {}, all, beside), sparse = at(m, {}, 0, beside);
+    EXPECT_NEAR(sparse[2].value, dense[2].value, 1e-8 + 1e-9 * dense[2].value) << from_singular;
+    if (from_singular > 1e-5) {
+      EXPECT_NEAR(sparse[1].value, dense[1].value, 1e-7) << from_singular;
+    }
+  }
 }
 
 }  // namespace

@@ -281,5 +281,90 @@ TEST(SparseFactors, OfNetsSolveAsDenseOnes) {
   EXPECT_LT((least.LeastNorm(b) - dense).norm(), 1e-11 * dense.norm());
 }
 
+// Wide ones by A Aᵀ, whose condition is the square of A's.
+TEST(SparseFactors, OfWideNetsSolveAsDenseOnes) {
+  SparseLu::Matrix A = ForcesOfNet(9);
+  VecX b(A.rows()), c(A.cols());
+  for (Eigen::Index k = 0; k < b.size(); ++k) b[k] = std::sin(1.7 * static_cast<double>(k));
+  for (Eigen::Index k = 0; k < c.size(); ++k) c[k] = std::cos(0.9 * static_cast<double>(k));
+  SparseLeastNorm least;
+  for (const double weakest : {1.0, 1e-3, 1e-2}) {  // of an equation, against before
+    for (Eigen::Index k = 0; k < A.cols(); ++k) {
+      for (SparseLu::Matrix::InnerIterator entry(A, k); entry; ++entry) {
+        if (entry.row() == 7) entry.valueRef() *= weakest;
+      }
+    }
+    ASSERT_TRUE(least.Factor(A, 0.0));
+    const MatX dense(A);
+    const VecX x = dense.completeOrthogonalDecomposition().solve(b);
+    EXPECT_LT((least.LeastNorm(b) - x).norm(), 1e-11 * x.norm()) << weakest;
+    const VecX y = MatX(dense.transpose()).completeOrthogonalDecomposition().solve(c);
+    for (const int refinements : {0, 1}) {
+      EXPECT_LT((least.LeastSquares(c, refinements) - y).norm(), 1e-10 * y.norm()) << weakest;
+    }
+  }
+}
+
+// Of C where G x = 0, dense: all of them, and the vectors.
+Eigen::JacobiSVD<MatX> DenseUnder(const MatX& C, const MatX& G) {
+  const Eigen::FullPivLU<MatX> lu(G);
+  const MatX N = MatX(lu.kernel()).householderQr().householderQ() *
+                 MatX::Identity(G.cols(), G.cols() - G.rows());
+  return Eigen::JacobiSVD<MatX>(MatX(C * N), Eigen::ComputeThinV);
+}
+
+TEST(LeastSingularValue, IsThatOfTheDenseMatrix) {
+  RandomMatrices of_C(40, 60), of_G(25, 60);
+  for (int k = 0; k < 20; ++k) {
+    SparseLu::Matrix C = of_C.Next();
+    const SparseLu::Matrix G = of_G.Next();
+    const double expected = DenseUnder(C, G).singularValues()[34];
+    const auto least = [&] {
+      return LeastSingular(SparseLu::Matrix(C.transpose()), SparseLu::Matrix(G.transpose()));
+    };
+    const SingularPair found = least();
+    ASSERT_TRUE(found.converged) << k;
+    EXPECT_NEAR(found.value, expected, 1e-9 * expected) << k;
+    EXPECT_NEAR(found.vector.norm(), 1.0, 1e-12);
+    EXPECT_LT((G * found.vector).norm(), 1e-11) << k;
+    EXPECT_NEAR((C * found.vector).norm(), expected, 1e-9 * expected) << k;
+    // Another matrix has another one.
+    C *= 1.0 + 1e-7;
+    EXPECT_GT(std::abs(least().value - expected), 5e-8 * expected) << k;
+  }
+}
+
+TEST(LeastSingularValue, IsFoundWhereItIsZeroOrOneOfMany) {
+  // Zero: the last row repeats the first.
+  MatX dense = MatX(RandomMatrices(12, 12).Next());
+  dense.row(11) = dense.row(0);
+  const SparseLu::Matrix none(12, 0);
+  const SingularPair zero = LeastSingular(SparseLu::Matrix(dense.transpose().sparseView()), none);
+  EXPECT_TRUE(zero.converged);
+  EXPECT_LT(zero.value, 1e-12);
+  EXPECT_LT((dense * zero.vector).norm(), 1e-12);
+  // Many: half of the 400 singular values are 0.3, the others lie close above.
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < 400; ++i) {
+    const double beyond = i % 2 == 0 ? 0.0 : 1e-6 * i;
+    entries.emplace_back(i, (7 * i + 3) % 400, 0.3 * (1.0 + beyond));
+  }
+  SparseLu::Matrix C(400, 400);
+  C.setFromTriplets(entries.begin(), entries.end());
+  const SingularPair many = LeastSingular(C, SparseLu::Matrix(400, 0));
+  EXPECT_TRUE(many.converged);
+  EXPECT_NEAR(many.value, 0.3, 1e-10);
+}
+
+TEST(LeastSingularValue, LeavesOutWhatIsProjectedAway) {
+  const MatX dense = MatX(RandomMatrices(30, 30).Next());
+  const Eigen::JacobiSVD<MatX> svd(dense, Eigen::ComputeThinV);
+  const MatX away = svd.matrixV().rightCols(3);
+  const SingularPair found =
+      LeastSingular(SparseLu::Matrix(dense.transpose().sparseView()), SparseLu::Matrix(30, 0),
+                    [&](VecX* x) { *x -= away * (away.transpose() * *x).eval(); });
+  EXPECT_NEAR(found.value, svd.singularValues()[26], 1e-10);
+}
+
 }  // namespace
 }  // namespace mbv

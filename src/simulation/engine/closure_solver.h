@@ -88,7 +88,8 @@ class ClosureSolver {
   [[nodiscard]] RunSummary CloseOr(const VecX& to, double farthest, VecX* here, Way&& way);
   [[nodiscard]] RunSummary Walk(const VecX& from, const VecX& to);
   [[nodiscard]] MatX ScaledSelfStress() const;
-  [[nodiscard]] double SelfStressOn(int row) const;
+  [[nodiscard]] double SelfStressIn(const VecX& force) const;
+  [[nodiscard]] bool DrivenRowsAreUnique() const;
   void Factor();
   void SolveInto(const VecX& b, VecX* x, int refinements = 1);  // x = J⁺ b
   void SolveTransposedInto(const VecX& b, VecX* x);             // x = (Jᵀ)⁺ b

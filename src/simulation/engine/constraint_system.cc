@@ -34,13 +34,9 @@ ConstraintSystem::ConstraintSystem(const EngineModel& engine, mjData* d)
   first_coupling_ = closure_rows_;
   closure_rows_ += static_cast<int>(engine.coupling_equality.size());
   rows_ = closure_rows_;
-  const auto driven = static_cast<Eigen::Index>(engine.driven.size());
-  given_.setZero(driven);
-  unit_.setZero(engine.m->nv, driven);
-  for (Eigen::Index k = 0; k < driven; ++k) {
-    const DrivenPlace& place = engine.driven[static_cast<size_t>(k)];
+  given_.setZero(static_cast<Eigen::Index>(engine.driven.size()));
+  for (const DrivenPlace& place : engine.driven) {
     driven_row_.push_back(place.forced ? -1 : rows_++);
-    if (!place.is_tendon) unit_(place.dof, k) = 1.0;
   }
   A0_.setZero(6, engine.m->nbody);
   FindUnits();
@@ -113,17 +109,32 @@ double ConstraintSystem::DrivenForce(int k) const {
   return driven_row_[k] >= 0 ? d_->efc_force[driven_row_[k]] : given_[k];
 }
 
-Eigen::Map<const VecX> ConstraintSystem::DrivenJacobian(int k) const {
+VecX ConstraintSystem::DrivenJacobian(int k) const {
   const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
   const int nv = engine_.m->nv;
-  if (place.is_tendon) return {d_->ten_J + place.object * nv, nv};
-  return {unit_.data() + static_cast<Eigen::Index>(k) * nv, nv};
+  if (!place.is_tendon) return VecX::Unit(nv, place.dof);
+  return Eigen::Map<const VecX>(d_->ten_J + place.object * nv, nv);
+}
+
+double ConstraintSystem::AlongDriven(int k, const double* x) const {
+  const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
+  if (!place.is_tendon) return x[place.dof] + 0.0;  // never −0, as sums are not
+  const int nv = engine_.m->nv;
+  return Eigen::Map<const VecX>(d_->ten_J + place.object * nv, nv)
+      .dot(Eigen::Map<const VecX>(x, nv));
 }
 
 void ConstraintSystem::AddGivenForces(double* qfrc) const {
-  Eigen::Map<VecX> out(qfrc, engine_.m->nv);
+  const int nv = engine_.m->nv;
   for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
-    if (driven_row_[k] < 0) out += given_[k] * DrivenJacobian(k);
+    if (driven_row_[k] >= 0) continue;
+    const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
+    if (place.is_tendon) {
+      Eigen::Map<VecX>(qfrc, nv) +=
+          given_[k] * Eigen::Map<const VecX>(d_->ten_J + place.object * nv, nv);
+    } else {
+      qfrc[place.dof] += given_[k];
+    }
   }
 }
 

@@ -55,7 +55,9 @@ class ConstraintSystem {
   /// Force of driven coordinate k: its constraint's, or the given one.
   [[nodiscard]] double DrivenForce(int k) const;
   /// dx/dq̇ of driven coordinate k at the present position.
-  [[nodiscard]] Eigen::Map<const VecX> DrivenJacobian(int k) const;
+  [[nodiscard]] VecX DrivenJacobian(int k) const;
+  /// Its product with velocities or accelerations of MuJoCo.
+  [[nodiscard]] double AlongDriven(int k, const double* x) const;
   /// J̇q̇ of driven coordinate k; after BodyBiasAccelerations() at the same state.
   [[nodiscard]] double DrivenBias(int k) const {
     const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
@@ -205,7 +207,6 @@ class ConstraintSystem {
   FrictionByLoad load_friction_;
   std::vector<int> sliding_, branches_;
   std::vector<double> engaged_;
-  MatX unit_;  // column k: gradient of driven joint k, where it has no row
   Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)
 };
 

@@ -37,12 +37,11 @@ void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates) 
   const EngineModel& engine = system.engine();
   const mjModel& m = *engine.m;
   const mjData& d = *system.data();
-  const ConstVecX qvel(d.qvel, m.nv);
   const auto driven = static_cast<Eigen::Index>(engine.driven.size());
   rates->setZero(driven + 2);
   for (Eigen::Index k = 0; k < driven; ++k) {
     const int coordinate = static_cast<int>(k);
-    (*rates)[k] = system.DrivenForce(coordinate) * system.DrivenJacobian(coordinate).dot(qvel);
+    (*rates)[k] = system.DrivenForce(coordinate) * system.AlongDriven(coordinate, d.qvel);
   }
   for (const WorldLoad& load : loads.world()) {
     const ConstVec3 w(d.cvel + 6 * load.body_id);
@@ -376,7 +375,6 @@ void Recorder::Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::Ro
 
 void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
   const mjData* d = system_->data();
-  const int nv = engine_.m->nv;
   system_->BodyBiasAccelerations();
   const int drives = static_cast<int>(engine_.mechanism->drives.size());
   for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
@@ -388,10 +386,9 @@ void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
     row[columns_(Quantity::kPosition, k)] = place.is_tendon
                                                 ? d->ten_length[place.object]
                                                 : d->qpos[engine_.m->jnt_qposadr[place.object]];
-    const auto J = system_->DrivenJacobian(k);
-    row[columns_(Quantity::kVelocity, k)] = J.dot(ConstVecX(d->qvel, nv));
+    row[columns_(Quantity::kVelocity, k)] = system_->AlongDriven(k, d->qvel);
     row[columns_(Quantity::kAcceleration, k)] =
-        J.dot(ConstVecX(d->qacc, nv)) + system_->DrivenBias(k);
+        system_->AlongDriven(k, d->qacc) + system_->DrivenBias(k);
     row[columns_(Quantity::kForce, k)] = system_->DrivenForce(k);
   }
 }
