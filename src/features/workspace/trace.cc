@@ -40,7 +40,7 @@ constexpr double kFlat = 1e-4;       // of a margin's rates where it vanishes tw
 constexpr double kOffValley = 1e-6;  // of its slope's rate, the slope there
 constexpr double kLeastStep = 1e-7;  // [rad, characteristic lengths]
 constexpr double kSmallStep = 5e-5;  // below, rounding may hide the curvature
-constexpr double kBendingStep = 1e-3;
+constexpr double kCurvedStep = 1e-3;
 constexpr double kFirstStep = 0.05, kLargestStep = 0.4, kLongerStep = 1.6;
 constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
@@ -670,7 +670,7 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
     double flattest = std::numeric_limits<double>::infinity();  // slope of the margin along n
     bool failed = false;
     const char* why = "no pose is near";
-    double fits = kLongerStep;  // a step by this one, by how the curve bends
+    double fits = kLongerStep;  // a step by this one, by the curvature
     // First to find what ends the step, then to its end.
     for (int attempt = 0; attempt < 2; ++attempt) {
       double end = h;
@@ -781,8 +781,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
                                             : 0.0)
               : kRoundings * std::abs(here.at.pose.margin[here.bound]) / (rate * h * nodes.node[1]);
       const double curves = tail.maxCoeff() / (kTail * size + blur);
-      // Of short steps rounding is more than what bends.
-      if (h > kBendingStep) fits = 0.9 * std::pow(curves, -1.0 / kDegree);
+      // Of short steps rounding is more than curvature.
+      if (h > kCurvedStep) fits = 0.9 * std::pow(curves, -1.0 / kDegree);
       failed = curves > 1.0 && h > kLeastStep;
       if (failed) why = "it curves too much";
       if (!failed && Dips(at, here.bound)) {
