@@ -233,8 +233,11 @@ struct SingularityMeter::Impl {
       Vec6 entry = scale * root_ * J;  // of v_Bo = v_c − ω × c
       const Vec3 f = entry.tail<3>();
       entry.head<3>() = (entry.head<3>() - c_[static_cast<size_t>(body)].cross(f)) / length_;
+      // Without rounding of zeros, so that patterns stay from pose to pose.
+      const double least = 16 * kEps * entry.norm();
       for (int k = 0; k < 6; ++k) {
-        if (entry[k] != 0.0) entries_.emplace_back(6 * (body - 1) + k, count_ - 1, entry[k]);
+        if (std::abs(entry[k]) > least)
+          entries_.emplace_back(6 * (body - 1) + k, count_ - 1, entry[k]);
       }
     }
     void Add(const ScalarRow& row, double scale) {

@@ -200,6 +200,41 @@ constexpr int kIterations = 6;
 constexpr double kLargestCoefficient = 2.0;
 constexpr Eigen::Index kMostCoefficients = 25'000'000;
 
+// `solve` is x → (R Rᵀ)⁻¹x.
+template <typename Solve>
+double SmallestByInverse(Eigen::Index size, const Solve& solve) {
+  VecX x(size);
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    x[i] = 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i));  // a share in every direction
+  }
+  double sigma = 0.0;
+  for (int i = 0; i < kIterations; ++i) {
+    x.normalize();
+    solve(&x);
+    sigma = 1.0 / std::sqrt(x.norm());
+  }
+  return std::isfinite(sigma) ? sigma : 0.0;
+}
+
+// Twice the largest |A N x| / |N x|, by power iteration.
+double LargestBeyond(const MatX& AN, const MatX& N) {
+  constexpr int kIterations = 20;
+  MatX squares = MatX::Zero(N.cols(), N.cols());
+  squares.selfadjointView<Eigen::Lower>().rankUpdate(N.transpose());
+  const Eigen::LLT<MatX> factors(squares);
+  VecX x(N.cols());
+  for (Eigen::Index i = 0; i < x.size(); ++i) x[i] = std::cos(0.7 * static_cast<double>(i * i));
+  double largest = 0.0;
+  for (int i = 0; i < kIterations; ++i) {
+    const VecX image = AN * x;
+    largest = image.norm() / VecX(N * x).norm();
+    x = factors.solve(AN.transpose() * image);
+    if (!(x.norm() > 0.0)) break;
+    x.normalize();
+  }
+  return 2.0 * largest;
+}
+
 double LongestColumn(const SparseRank::Matrix& A) {
   double longest = 0.0;
   for (int c = 0; c < A.cols(); ++c) longest = std::max(longest, A.col(c).norm());
@@ -254,6 +289,20 @@ SparseRank::SparseRank(const Matrix& A, double tolerance) {
     (R_[place].empty() ? dropped_ : kept_).push_back(static_cast<int>(place));
   }
   Arrange();
+  if (clear_ || !(smallest_kept_ > kClear * std::max(limit_, dropped_norm_))) return;
+  // Many small entries have a large norm together, and may have no large singular value: what A
+  // does to its null space bounds all of these beyond the rank.
+  const MatX D = Coefficients();
+  if (D.size() == 0) return;
+  MatX N = MatX::Zero(A.cols(), D.cols());
+  for (size_t k = 0; k < kept_.size(); ++k) {
+    N.row(order_[static_cast<size_t>(kept_[k])]) = -D.row(static_cast<Eigen::Index>(k));
+  }
+  for (size_t k = 0; k < dropped_.size(); ++k) {
+    N(order_[static_cast<size_t>(dropped_[k])], static_cast<Eigen::Index>(k)) = 1.0;
+  }
+  dropped_norm_ = std::min(dropped_norm_, LargestBeyond(A * N, N));
+  clear_ = dropped_norm_ <= limit_;
 }
 
 void SparseRank::Order(const Matrix& A) {
@@ -309,8 +358,10 @@ void SparseRank::Arrange() {
   R_dropped_.resize(n, static_cast<Eigen::Index>(dropped_.size()));
   R_dropped_.setFromTriplets(rest.begin(), rest.end());
   R_.clear();
+  const auto clear = [&] { return n == 0 || smallest_kept_ > kClear * limit_; };
   smallest_kept_ = SmallestSingularValue();
-  clear_ = dropped_norm_ <= limit_ && (n == 0 || smallest_kept_ > kClear * limit_);
+  if (!clear()) smallest_kept_ = std::max(smallest_kept_, SmallestOfAll());
+  clear_ = dropped_norm_ <= limit_ && clear();
 }
 
 std::vector<int> SparseRank::ColumnsAt(const std::vector<int>& places) const {
@@ -326,11 +377,9 @@ std::vector<int> SparseRank::Independent() const { return ColumnsAt(kept_); }
 // With K the columns kept and D = K⁻¹ (those dropped), exchanging column i of K for dropped column
 // j multiplies the volume of K by |D_ij|: pivots of Gauss and Jordan on D.
 std::vector<int> SparseRank::FirmlyIndependent() const {
-  const auto rank = static_cast<Eigen::Index>(kept_.size());
-  const auto rest = static_cast<Eigen::Index>(dropped_.size());
-  if (rank == 0 || rest == 0 || rank > kMostCoefficients / rest) return Independent();
-  MatX D(R_dropped_);
-  R_kept_.triangularView<Eigen::Upper>().solveInPlace(D);
+  MatX D = Coefficients();
+  if (D.size() == 0) return Independent();
+  const Eigen::Index rank = D.rows(), rest = D.cols();
   std::vector<int> chosen = kept_, others = dropped_;
   for (Eigen::Index exchanges = 0; exchanges < rank + rest; ++exchanges) {
     Eigen::Index i = 0, j = 0;
@@ -349,18 +398,35 @@ std::vector<int> SparseRank::FirmlyIndependent() const {
 }
 
 double SparseRank::SmallestSingularValue() const {
-  VecX x(R_kept_.cols());
-  for (Eigen::Index i = 0; i < x.size(); ++i) {
-    x[i] = 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i));  // a share in every direction
-  }
-  double sigma = 0.0;
-  for (int i = 0; i < kIterations; ++i) {
-    x.normalize();
-    R_kept_.triangularView<Eigen::Upper>().solveInPlace(x);
-    R_kept_.transpose().triangularView<Eigen::Lower>().solveInPlace(x);
-    sigma = 1.0 / std::sqrt(x.norm());
-  }
-  return std::isfinite(sigma) ? sigma : 0.0;
+  return SmallestByInverse(R_kept_.cols(), [this](VecX* x) {
+    R_kept_.triangularView<Eigen::Upper>().solveInPlace(*x);
+    R_kept_.transpose().triangularView<Eigen::Lower>().solveInPlace(*x);
+  });
+}
+
+// Of R with what is dropped beside it, whichever columns those are: with K the columns kept and
+// D = K⁻¹ (those dropped),  R Rᵀ = K (1 + D Dᵀ) Kᵀ. Zero where that is too large.
+double SparseRank::SmallestOfAll() const {
+  const MatX D = Coefficients();
+  if (D.size() == 0) return 0.0;
+  MatX small = MatX::Identity(D.cols(), D.cols());
+  small.selfadjointView<Eigen::Lower>().rankUpdate(D.transpose());
+  const Eigen::LLT<MatX> factors(small);
+  return SmallestByInverse(R_kept_.cols(), [&](VecX* x) {
+    R_kept_.triangularView<Eigen::Upper>().solveInPlace(*x);
+    const VecX beside = factors.solve(D.transpose() * *x);
+    x->noalias() -= D * beside;
+    R_kept_.transpose().triangularView<Eigen::Lower>().solveInPlace(*x);
+  });
+}
+
+MatX SparseRank::Coefficients() const {
+  const auto rank = static_cast<Eigen::Index>(kept_.size());
+  const auto rest = static_cast<Eigen::Index>(dropped_.size());
+  if (rank == 0 || rest == 0 || rank > kMostCoefficients / rest) return {};
+  MatX D(R_dropped_);
+  R_kept_.triangularView<Eigen::Upper>().solveInPlace(D);
+  return D;
 }
 
 MatX SparseRank::NullSpace() const {

@@ -71,7 +71,8 @@ class SparseRank {
   /// Singular values would say the same: with entries dropped of norm e, A has none between e and
   /// about the smallest of R.
   [[nodiscard]] bool clear() const { return clear_; }
-  /// Estimate of the smallest singular value of the columns kept, and the Frobenius norm of all
+  /// Estimate of the smallest singular value of the columns kept, or where that leaves open what is
+  /// kept of all columns beyond what counts as zero; and the Frobenius norm of all
   /// that was taken for zero: no singular value beyond the rank is larger.
   [[nodiscard]] double smallest_kept() const { return smallest_kept_; }
   [[nodiscard]] double dropped_norm() const { return dropped_norm_; }
@@ -88,6 +89,8 @@ class SparseRank {
   void Arrange();
   [[nodiscard]] std::vector<int> ColumnsAt(const std::vector<int>& places) const;
   [[nodiscard]] double SmallestSingularValue() const;
+  [[nodiscard]] double SmallestOfAll() const;
+  [[nodiscard]] MatX Coefficients() const;
 
   double limit_ = 0.0;
   std::vector<int> order_;           ///< column of A at each place

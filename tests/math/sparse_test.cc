@@ -190,6 +190,13 @@ TEST(SparseRanks, AreNotClearWhereManySmallEntriesAddUp) {
   dense *= 0.1;
   dense(0, 0) = 1.0;
   EXPECT_TRUE(SparseRank(dense.sparseView(), 1e-9).clear());
+  // As many in as many directions do not.
+  MatX apart = MatX::Zero(40, 31);
+  apart(0, 0) = 1.0;
+  for (int c = 1; c < 31; ++c) apart(c + 5, c) = 0.4e-9;
+  EXPECT_TRUE(SparseRank(apart.sparseView(), 1e-9).clear());
+  apart(7, 2) = 0.9e-9;
+  EXPECT_FALSE(SparseRank(apart.sparseView(), 1e-9).clear());
 }
 
 TEST(SparseLeastNorms, AreThoseOfTheDensePseudoInverse) {
@@ -281,6 +288,26 @@ TEST(SparseFactors, OfNetsSolveAsDenseOnes) {
   EXPECT_LT((least.LeastNorm(b) - dense).norm(), 1e-11 * dense.norm());
 }
 
+// Columns that depend on each other in a row: whichever is dropped, from the one end or the other
+// the rest is nearly singular, and the matrix is not.
+TEST(SparseRanks, AreClearWhateverColumnIsDropped) {
+  constexpr int kRows = 60;
+  for (const double ratio : {1.5, 1.0 / 1.5}) {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int i = 0; i < kRows; ++i) {
+      entries.emplace_back(i, i, 1.0);
+      entries.emplace_back(i, i + 1, -ratio);
+    }
+    SparseRank::Matrix A(kRows, kRows + 1);
+    A.setFromTriplets(entries.begin(), entries.end());
+    const SparseRank ranks(A, 1e-9);
+    EXPECT_EQ(ranks.rank(), kRows);
+    EXPECT_TRUE(ranks.clear()) << ratio;
+    const double least = Eigen::JacobiSVD<MatX>(MatX(A)).singularValues()[kRows - 1];
+    EXPECT_LT(ranks.smallest_kept(), 1.5 * least) << ratio;
+  }
+}
+
 // Wide ones by A Aᵀ, whose condition is the square of A's.
 TEST(SparseFactors, OfWideNetsSolveAsDenseOnes) {
   SparseLu::Matrix A = ForcesOfNet(9);
@@ -288,19 +315,22 @@ TEST(SparseFactors, OfWideNetsSolveAsDenseOnes) {
   for (Eigen::Index k = 0; k < b.size(); ++k) b[k] = std::sin(1.7 * static_cast<double>(k));
   for (Eigen::Index k = 0; k < c.size(); ++k) c[k] = std::cos(0.9 * static_cast<double>(k));
   SparseLeastNorm least;
-  for (const double weakest : {1.0, 1e-3, 1e-2}) {  // of an equation, against before
+  double weakest = 1.0;  // of an equation, against the others
+  for (const double weaker : {1.0, 1e-3, 1e-2}) {
+    weakest *= weaker;
     for (Eigen::Index k = 0; k < A.cols(); ++k) {
       for (SparseLu::Matrix::InnerIterator entry(A, k); entry; ++entry) {
-        if (entry.row() == 7) entry.valueRef() *= weakest;
+        if (entry.row() == 7) entry.valueRef() *= weaker;
       }
     }
+    const double rounding = 1e-12 + 100 * kEps / weakest;
     ASSERT_TRUE(least.Factor(A, 0.0));
     const MatX dense(A);
     const VecX x = dense.completeOrthogonalDecomposition().solve(b);
-    EXPECT_LT((least.LeastNorm(b) - x).norm(), 1e-11 * x.norm()) << weakest;
+    EXPECT_LT((least.LeastNorm(b) - x).norm(), rounding * x.norm()) << weakest;
     const VecX y = MatX(dense.transpose()).completeOrthogonalDecomposition().solve(c);
     for (const int refinements : {0, 1}) {
-      EXPECT_LT((least.LeastSquares(c, refinements) - y).norm(), 1e-10 * y.norm()) << weakest;
+      EXPECT_LT((least.LeastSquares(c, refinements) - y).norm(), rounding * y.norm()) << weakest;
     }
   }
 }
