@@ -292,6 +292,11 @@ SparseRank::SparseRank(const Matrix& A, double tolerance) {
   if (clear_ || !(smallest_kept_ > kClear * std::max(limit_, dropped_norm_))) return;
   // Many small entries have a large norm together, and may have no large singular value: what A
   // does to its null space bounds all of these beyond the rank.
+  if (dropped_.empty()) {
+    dropped_norm_ = 0.0;
+    clear_ = true;
+    return;
+  }
   const MatX D = Coefficients();
   if (D.size() == 0) return;
   MatX N = MatX::Zero(A.cols(), D.cols());

@@ -197,6 +197,11 @@ TEST(SparseRanks, AreNotClearWhereManySmallEntriesAddUp) {
   EXPECT_TRUE(SparseRank(apart.sparseView(), 1e-9).clear());
   apart(7, 2) = 0.9e-9;
   EXPECT_FALSE(SparseRank(apart.sparseView(), 1e-9).clear());
+  // Nor do any where no column is left.
+  MatX tall = MatX::Zero(40, 2);
+  tall(0, 0) = tall(1, 1) = 1.0;
+  tall.bottomRows(20).setConstant(0.9e-9);
+  EXPECT_TRUE(SparseRank(tall.sparseView(), 1e-9).clear());
 }
 
 TEST(SparseLeastNorms, AreThoseOfTheDensePseudoInverse) {
