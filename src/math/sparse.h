@@ -71,9 +71,9 @@ class SparseRank {
   /// Singular values would say the same: with entries dropped of norm e, A has none between e and
   /// about the smallest of R.
   [[nodiscard]] bool clear() const { return clear_; }
-  /// Estimate of the smallest singular value of the columns kept, or where that leaves open what is
-  /// kept of all columns beyond what counts as zero; and the Frobenius norm of all
-  /// that was taken for zero: no singular value beyond the rank is larger.
+  /// Estimate of the smallest singular value of the columns kept, or where these are a poor choice
+  /// of all beyond the zeros; and a bound of what was taken for zero: its Frobenius norm, or what A
+  /// does to its null space. No singular value beyond the rank is larger.
   [[nodiscard]] double smallest_kept() const { return smallest_kept_; }
   [[nodiscard]] double dropped_norm() const { return dropped_norm_; }
   /// Columns × (columns − rank), A N = 0: of each dropped column what balances it among those kept;

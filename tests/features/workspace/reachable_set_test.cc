@@ -127,13 +127,13 @@ TEST(ReachableSet, AnArmsPathEndsWhereItIsStretched) {
   EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
 }
 
-// cos θ1 cos θ2 > cos α.
 // The drum turns a hundred times on the way.
 TEST(ReachableSet, ABoxEndsALongWay) {
   const Answer answer = Ask(ShippedModel("winch"), Over({"z=-10:-0.5"}, 400));
   ExpectMeasure(answer, 9.5, 1e-9);
 }
 
+// cos θ1 cos θ2 > cos α.
 TEST(ReachableSet, AConeOfAUniversalJointIsACone) {
   const Mechanism joint = FromText(R"(
 name: universal
