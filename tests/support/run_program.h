@@ -119,6 +119,7 @@ class Program {
     setenv(kInFork, "", 1);
     if (columns != nullptr) setenv("COLUMNS", columns, 1);
     std::vector<char*> argv;
+    argv.reserve(words.size() + 1);
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
     const int code = RunProgram(static_cast<int>(words.size()), argv.data());
