@@ -304,9 +304,9 @@ struct SingularityMeter::Impl {
     return OfUnitLength(SideBySide({&here.tree, &here.loops}));
   }
   // Of all rows at a pose. Poses of simulations close to 1e-8 or so.
-  [[nodiscard]] static SparseRank RankOf(const SparseHere& here) {
-    SparseRank ranks(AllRows(here), internal::kRankTolerance);
-    return ranks.clear() ? ranks : SparseRank(AllRows(here), kLost);
+  [[nodiscard]] static SparseRank RankOf(const SparseLu::Matrix& all) {
+    SparseRank ranks(all, internal::kRankTolerance);
+    return ranks.clear() ? ranks : SparseRank(all, kLost);
   }
   // Factors the rows that the meter holds, or others of the pose. False where (2) is singular.
   [[nodiscard]] bool Hold(SparseHere* here) const {
@@ -318,7 +318,7 @@ struct SingularityMeter::Impl {
       return here->motions.Factor(SparseLu::Matrix(here->held.transpose()), kLeastPivot);
     };
     if (factor(held_rows)) return true;
-    const SparseRank ranks = RankOf(*here);
+    const SparseRank ranks = RankOf(all);
     return ranks.rank() == static_cast<int>(held_rows.size()) && factor(ranks.FirmlyIndependent());
   }
   [[nodiscard]] std::optional<Distance> Judged(const SparseHere& here,
@@ -363,19 +363,19 @@ struct SingularityMeter::Impl {
   }
   // The rank, rows of as many, and whether the drives hold every motion.
   void FindRows(const std::vector<BodyStates>& some) {
+    std::vector<SparseHere> heres;
     std::optional<SparseRank> most;
     for (const BodyStates& states : some) {
-      SparseRank ranks = RankOf(PlaceSparse(states));
+      heres.push_back(PlaceSparse(states));
+      SparseRank ranks = RankOf(AllRows(heres.back()));
       if (!most || ranks.rank() > most->rank()) most = std::move(ranks);
     }
     held_rows = most->FirmlyIndependent();
-    rank = most->rank() - PlaceSparse(some.front()).tree.cols();
-    for (const BodyStates& states : some) {
-      SparseHere here = PlaceSparse(states);
-      if (!Hold(&here)) continue;
-      const std::optional<Distance> forward = LeastSparse(driven, states, here);
+    rank = most->rank() - heres.front().tree.cols();
+    for (size_t k = 0; k < some.size() && !holds; ++k) {
+      if (!Hold(&heres[k])) continue;
+      const std::optional<Distance> forward = LeastSparse(driven, some[k], heres[k]);
       holds = forward && forward->value > kLost;
-      if (holds) break;
     }
   }
 

@@ -218,14 +218,14 @@ double SmallestByInverse(Eigen::Index size, const Solve& solve) {
 
 // Twice the largest |A N x| / |N x|, by power iteration.
 double LargestBeyond(const MatX& AN, const MatX& N) {
-  constexpr int kIterations = 20;
+  constexpr int kPowerSteps = 20;
   MatX squares = MatX::Zero(N.cols(), N.cols());
   squares.selfadjointView<Eigen::Lower>().rankUpdate(N.transpose());
   const Eigen::LLT<MatX> factors(squares);
   VecX x(N.cols());
   for (Eigen::Index i = 0; i < x.size(); ++i) x[i] = std::cos(0.7 * static_cast<double>(i * i));
   double largest = 0.0;
-  for (int i = 0; i < kIterations; ++i) {
+  for (int i = 0; i < kPowerSteps; ++i) {
     const VecX image = AN * x;
     largest = image.norm() / VecX(N * x).norm();
     x = factors.solve(AN.transpose() * image);

@@ -56,19 +56,11 @@ class Program {
   }
   /// The same in a fork of the test, which has the program inside: nothing is loaded anew, which
   /// is most of what help and wrong arguments cost. Not for what starts workers: they would be
-  /// this test. Words are parted by blanks or in ''.
+  /// this test. Words are parted by blanks alone.
   ProgramResult Forked(const std::string& arguments, const char* columns = nullptr) const {
     std::vector<std::string> words = {std::string(kBinaryDir) + "/mbverify"};
-    for (bool quoted = false, inside = false; const char c : arguments) {
-      if (c == '\'') quoted = !quoted;
-      if (c == '\'' || c == ' ') {
-        if (!quoted && c == ' ') inside = false;
-        if (c == '\'' || !quoted) continue;
-      }
-      if (!inside) words.emplace_back();
-      inside = true;
-      words.back() += c;
-    }
+    std::istringstream stream(arguments);
+    for (std::string word; stream >> word;) words.push_back(word);
     std::cout.flush(), std::fflush(nullptr);  // else the fork writes it, too
     const pid_t child = fork();
     if (child == 0) RunIn(words, columns);
