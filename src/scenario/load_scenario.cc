@@ -852,17 +852,17 @@ const UnitSuffix* UnitOfKey(const std::string& key, std::string_view word) {
 }
 
 // The number of a term that `path` names within its node.
-std::optional<CommandNumber> NumberOfTerm(const YamlNode& node, const std::string& path,
-                                          const ProfileTerm& term) {
-  using Field = CommandNumber::Field;
+std::optional<MotionNumber> NumberOfTerm(const YamlNode& node, const std::string& path,
+                                         const ProfileTerm& term) {
+  using Field = MotionNumber::Field;
   const bool constant = std::holds_alternative<ConstantTerm>(term);
   if (path.empty()) {
     if (!constant || !node.is_scalar()) return {};
-    return CommandNumber{.field = Field::kConstant, .to_si = kPlain.to_si};
+    return MotionNumber{.field = Field::kConstant, .to_si = kPlain.to_si};
   }
   if (!node.is_map() || node.entries.size() != 1) return {};
   if (const UnitSuffix* unit = UnitOfKey(path, "value"); unit != nullptr && constant) {
-    return CommandNumber{.field = Field::kConstant, .to_si = unit->to_si};
+    return MotionNumber{.field = Field::kConstant, .to_si = unit->to_si};
   }
   constexpr std::string_view kSine = "sine.";
   if (!path.starts_with(kSine) || !std::holds_alternative<SineTerm>(term)) return {};
@@ -871,18 +871,65 @@ std::optional<CommandNumber> NumberOfTerm(const YamlNode& node, const std::strin
        {std::pair{"amplitude", Field::kAmplitude}, std::pair{"phase", Field::kPhase},
         std::pair{"frequency_hz", Field::kFrequency}, std::pair{"period_s", Field::kPeriod}}) {
     const UnitSuffix* unit = UnitOfKey(key, word);
-    if (unit != nullptr) return CommandNumber{.field = field, .to_si = unit->to_si};
+    if (unit != nullptr) return MotionNumber{.field = field, .to_si = unit->to_si};
   }
   return {};
 }
 
+template <typename AnyMotion>
+auto& ProfileAt(AnyMotion* motion, const MotionNumber& number) {
+  if (number.section == MotionNumber::Section::kCommands) {
+    return motion->commands[number.item].profile;
+  }
+  auto& load = motion->loads[number.item];
+  return number.component < 3 ? load.force[number.component] : load.moment[number.component - 3];
+}
+
+// The number that `path` names below the commands or loads of a file.
+std::optional<MotionNumber> NumberIn(const YamlNode& all, MotionNumber::Section section,
+                                     const std::string& path, const Motion& motion) {
+  const bool of_command = section == MotionNumber::Section::kCommands;
+  const size_t length = FirstKey(all, path, of_command ? "commands" : "loads");
+  const auto entry = std::ranges::find(all.entries, path.substr(0, length), &YamlEntry::key);
+  if (entry == all.entries.end()) return {};
+  MotionNumber place{.section = section, .item = static_cast<size_t>(entry - all.entries.begin())};
+  if (place.item >= (of_command ? motion.commands.size() : motion.loads.size())) return {};
+  const YamlNode* node = entry->value.get();
+  ListStep step{0, length < path.size() ? path.substr(length + 1) : ""};
+  if (!of_command) {
+    if (!node->is_map()) return {};
+    const std::string vector = step.rest.substr(0, step.rest.find('.'));
+    if (vector != "force" && vector != "moment") return {};
+    const YamlNode* components = node->Find(vector);
+    if (components == nullptr || vector.size() == step.rest.size()) return {};
+    const auto component = FirstItem(components, step.rest.substr(vector.size() + 1));
+    if (!component) return {};
+    place.component = component->index + (vector == "force" ? 0 : 3);
+    node = components->items[component->index].get();
+    step.rest = component->rest;
+  }
+  // One term for each item of a list; none where a component follows the mechanism's state.
+  const std::vector<ProfileTerm>& terms = ProfileAt(&motion, place).terms;
+  if (terms.size() != (node->is_sequence() ? node->items.size() : 1)) return {};
+  if (node->is_sequence()) {
+    const auto first = FirstItem(node, step.rest);
+    if (!first) return {};
+    step = *first;
+    node = node->items[step.index].get();
+  }
+  auto number = NumberOfTerm(*node, step.rest, terms[step.index]);
+  if (!number) return {};
+  place.term = step.index, place.field = number->field, place.to_si = number->to_si;
+  return place;
+}
+
 }  // namespace
 
-bool CommandNumber::Put(double value, Motion* motion) const {
+bool MotionNumber::Put(double value, Motion* motion) const {
   if (!std::isfinite(value)) return false;
   const bool positive = field == Field::kFrequency || field == Field::kPeriod;
   if (positive && value <= 0.0) return false;
-  ProfileTerm& at = motion->commands[command].profile.terms[term];
+  ProfileTerm& at = ProfileAt(motion, *this).terms[term];
   const double si = to_si(value);
   switch (field) {
     case Field::kConstant:
@@ -904,33 +951,18 @@ bool CommandNumber::Put(double value, Motion* motion) const {
   return true;
 }
 
-// Commands come first in a motion, in the order of the file, and with one term each.
-std::optional<CommandNumber> ScenarioMemory::FindCommandNumber(const std::string& key,
-                                                               const Motion& motion) const {
-  constexpr std::string_view kCommands = "motion.commands.";
-  const YamlNode* section = root_ == nullptr ? nullptr : FindSetNode(*root_, "motion.commands");
-  if (section == nullptr || !section->is_map() || !key.starts_with(kCommands)) return {};
-  const std::string path = key.substr(kCommands.size());
-  const size_t length = FirstKey(*section, path, "commands");
-  const auto entry = std::ranges::find(section->entries, path.substr(0, length), &YamlEntry::key);
-  if (entry == section->entries.end()) return {};
-  const auto command = static_cast<size_t>(entry - section->entries.begin());
-  if (command >= motion.commands.size()) return {};
-  // One term for each item of a list.
-  const std::vector<ProfileTerm>& terms = motion.commands[command].profile.terms;
-  const YamlNode* node = entry->value.get();
-  ListStep step{0, length < path.size() ? path.substr(length + 1) : ""};
-  const size_t items = node->is_sequence() ? node->items.size() : 1;
-  if (terms.size() != items) return {};
-  if (node->is_sequence()) {
-    const auto first = FirstItem(node, step.rest);
-    if (!first) return {};
-    step = *first;
-    node = node->items[step.index].get();
+// Commands come first in a motion, loads fill theirs; both in the order of the file.
+std::optional<MotionNumber> ScenarioMemory::FindMotionNumber(const std::string& key,
+                                                             const Motion& motion) const {
+  using Section = MotionNumber::Section;
+  if (root_ == nullptr) return {};
+  for (const auto& [section, path] :
+       {std::pair{Section::kCommands, "motion.commands"}, std::pair{Section::kLoads, "loads"}}) {
+    const YamlNode* node = FindSetNode(*root_, path);
+    if (node == nullptr || !node->is_map() || !key.starts_with(path + std::string("."))) continue;
+    return NumberIn(*node, section, key.substr(std::string_view(path).size() + 1), motion);
   }
-  auto number = NumberOfTerm(*node, step.rest, terms[step.index]);
-  if (number) number->command = command, number->term = step.index;
-  return number;
+  return {};
 }
 
 std::optional<std::string> ScenarioMemory::Find(const std::string& model, const fs::path& folder) {

@@ -95,11 +95,15 @@ struct ScenarioHead {
                                                LoadOptions* options);
 
 /// A number that --set names, where it stands in a scenario's motion: a constant of a command's
-/// profile, or one of a sine's numbers.
-struct CommandNumber {
+/// profile or of a load's component, or one of a sine's numbers.
+struct MotionNumber {
   enum class Field { kConstant, kAmplitude, kPhase, kFrequency, kPeriod };
+  enum class Section { kCommands, kLoads };
 
-  size_t command = 0, term = 0;  ///< indices into Motion::commands and Profile::terms
+  Section section = Section::kCommands;
+  size_t item = 0;       ///< index into Motion::commands or Motion::loads
+  size_t component = 0;  ///< of a load: 0 to 2 of the force, 3 to 5 of the moment
+  size_t term = 0;       ///< index into Profile::terms
   Field field = Field::kConstant;
   double (*to_si)(double value) = nullptr;  ///< from the key's unit
 
@@ -121,8 +125,8 @@ class ScenarioMemory {
                                 YamlReader* reader);
   /// Where the number of `key` stands in the motion that was loaded last, if that is all that
   /// depends on it; else empty.
-  [[nodiscard]] std::optional<CommandNumber> FindCommandNumber(const std::string& key,
-                                                               const Motion& motion) const;
+  [[nodiscard]] std::optional<MotionNumber> FindMotionNumber(const std::string& key,
+                                                             const Motion& motion) const;
   /// FindModel() and LoadModel().
   [[nodiscard]] std::optional<std::string> Find(const std::string& model,
                                                 const std::filesystem::path& folder);

@@ -76,8 +76,8 @@ void AddFormFindings(const std::string& scenario_file, const Diagnostics& found,
 [[nodiscard]] std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics,
                                               const ProgramConsent& consent = {});
 
-/// After numbers in the commands' profiles of `prepared->scenario.motion` have changed, and nothing
-/// else: makes again what depends on them. False after bad input.
+/// After numbers in profiles of commands and loads of `prepared->scenario.motion` have changed, and
+/// nothing else: makes again what depends on them. False after bad input.
 [[nodiscard]] bool PrepareAgain(Prepared* prepared, Diagnostics* diagnostics);
 
 /// The phases of a scenario, each from where the reference's kinematics leaves the one before; a

@@ -154,10 +154,10 @@ Finding FindingAt(const Study& study, int line, int column, std::string message,
 
 }  // namespace
 
-// Where points differ in numbers of commands alone, everything else stays prepared, and the traces
-// of a point take the place of those of the point before.
+// Where points differ in numbers of commands and loads alone, everything else stays prepared, and
+// the traces of a point take the place of those of the point before.
 struct StudyBench::Kept {
-  std::vector<CommandNumber> numbers;  // per factor
+  std::vector<MotionNumber> numbers;  // per factor
   Prepared prepared;
   StudyRun run;
 
@@ -184,7 +184,7 @@ void StudyBench::Keep() {
   const Motion& motion = kept->prepared.scenario.motion;
   if (motion.free()) return;  // it may begin where its commands are
   for (const Factor& factor : study_.factors) {
-    const auto number = memory_.FindCommandNumber(factor.key, motion);
+    const auto number = memory_.FindMotionNumber(factor.key, motion);
     if (!number) return;
     kept->numbers.push_back(*number);
   }

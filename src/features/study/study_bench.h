@@ -68,7 +68,8 @@ class StudyBench {
   /// That of the same study with another number of drawn points.
   [[nodiscard]] std::string FingerprintOf(std::uint64_t count) const;
 
-  /// Whether points differ in numbers of commands alone, so that no file is read for them again.
+  /// Whether points differ in numbers of commands and loads alone, so that no file is read for
+  /// them.
   [[nodiscard]] bool keeps() const { return kept_ != nullptr; }
   /// A function of the study and the number alone.
   [[nodiscard]] StudyPoint Run(std::uint64_t number) const;
@@ -95,7 +96,7 @@ class StudyBench {
 
   Study study_;
   mutable ScenarioMemory memory_;
-  std::unique_ptr<Kept> kept_;  // null where more than numbers of commands is varied
+  std::unique_ptr<Kept> kept_;  // null where more than these numbers is varied
   DesignPoints points_;
   StudyPoint nominal_;
   StudyForces forces_;

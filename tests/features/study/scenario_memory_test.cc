@@ -225,22 +225,27 @@ TEST_F(ScenarioMemoryTest, PointsOfShippedStudiesAreThoseOfTheirCommands) {
   EXPECT_GE(studies, 13);
 }
 
-// What a command is at some times.
-std::string BitsOfCommands(const Motion& motion) {
+// What commands and loads are at some times.
+std::string BitsOfProfiles(const Motion& motion) {
   std::string text;
-  for (const Command& command : motion.commands) {
+  const auto add = [&](const Profile& profile) {
     for (const double share : {0.0, 0.31, 1.0}) {
-      const Jet jet = Evaluate(command.profile, share * motion.duration_s);
+      const Jet jet = Evaluate(profile, share * motion.duration_s);
       text += Bits(std::vector{jet.value, jet.rate, jet.acceleration});
     }
+  };
+  for (const Command& command : motion.commands) add(command.profile);
+  for (const Load& load : motion.loads) {
+    for (const Profile& component : load.force) add(component);
+    for (const Profile& component : load.moment) add(component);
   }
   return text;
 }
 
-TEST_F(ScenarioMemoryTest, NumbersOfCommandsAreThoseThatLoadingGives) {
+TEST_F(ScenarioMemoryTest, NumbersOfMotionsAreThoseThatLoadingGives) {
   const ParsedDocuments documents;
   std::mt19937_64 random(20261129);
-  int found = 0;
+  int found = 0, of_loads = 0;
   for (const std::string& file : ShippedFiles(false)) {
     YamlReader reader(file);
     const auto text = reader.ReadFile();
@@ -251,32 +256,34 @@ TEST_F(ScenarioMemoryTest, NumbersOfCommandsAreThoseThatLoadingGives) {
     AddKeys(*root, "", &keys);
     ScenarioMemory memory;
     for (const std::string& key : keys) {
-      if (!key.starts_with("motion.commands.")) continue;
+      const bool of_load = key.starts_with("loads.");
+      if (!of_load && !key.starts_with("motion.commands.")) continue;
       const double value = std::uniform_real_distribution(0.97, 1.03)(random) *
                            *PlainNumber(FindSetNode(*root, key)->text);
       const std::vector<SetValue> set = {{key, fmt::format("{:.17g}", value)}};
       const ScenarioResult loaded = LoadScenario(file, {.set = set}, &memory);
       if (!loaded.scenario) continue;
       Motion motion = nominal.scenario->motion;
-      const auto number = memory.FindCommandNumber(key, loaded.scenario->motion);
+      const auto number = memory.FindMotionNumber(key, loaded.scenario->motion);
       if (!number) continue;
       ASSERT_TRUE(number->Put(value, &motion)) << file << ' ' << key;
-      EXPECT_EQ(BitsOfCommands(motion), BitsOfCommands(loaded.scenario->motion))
+      EXPECT_EQ(BitsOfProfiles(motion), BitsOfProfiles(loaded.scenario->motion))
           << file << ' ' << key;
-      // Where the number moves the command, another one is seen.
+      // Another number is seen.
       ASSERT_TRUE(number->Put(1.001 * value + 1e-3, &motion));
-      EXPECT_NE(BitsOfCommands(motion), BitsOfCommands(loaded.scenario->motion))
+      EXPECT_NE(BitsOfProfiles(motion), BitsOfProfiles(loaded.scenario->motion))
           << file << ' ' << key;
-      ++found;
+      ++(of_load ? of_loads : found);
     }
   }
   EXPECT_GT(found, 200);
+  EXPECT_GT(of_loads, 20);
 }
 
 TEST_F(ScenarioMemoryTest, NumbersThatTheReaderRefusesAreNotPut) {
   Motion motion;
   motion.commands.push_back({.name = "a", .profile = {{SineTerm{1.0, 2.0, 0.5}}}});
-  CommandNumber number{.field = CommandNumber::Field::kPeriod, .to_si = kPlain.to_si};
+  MotionNumber number{.field = MotionNumber::Field::kPeriod, .to_si = kPlain.to_si};
   for (const double refused : {0.0, -1.0, kNan, HUGE_VAL}) {
     EXPECT_FALSE(number.Put(refused, &motion)) << refused;
   }
@@ -303,6 +310,9 @@ TEST_F(ScenarioMemoryTest, FormsThatServeAnyProfilesForgetTheMotionBefore) {
         if (auto* sine = std::get_if<SineTerm>(&term)) sine->phase_rad += 0.7;
         if (auto* constant = std::get_if<ConstantTerm>(&term)) constant->value *= 1.01;
       }
+    }
+    for (Load& load : other.loads) {
+      for (Profile& component : load.force) component.terms.push_back(ConstantTerm{3.0});
     }
     const auto run = [&](const Prepared& prepared, const Motion& along) {
       return RunClosedForm(prepared.mechanisms.analytic, along,
@@ -397,6 +407,15 @@ const std::vector<Varied> kVaried = {
     {"gravity in the model", "spr_tripod/random", "parameters.g", 9.7, 9.9, "leg1.force.max"},
     {"a friction number", "friction_five_bar/draw_inverse", "parameters.dry", 0.15, 0.25,
      "motor1.force.max"},
+    {"a load",
+     "cabin_robot/wrench",
+     "loads.tool.moment.1",
+     -9.0,
+     9.0,
+     "th4.force.max",
+     {"analytic", "reference"}},
+    {"a sine of a load", "scara_robot/tool_load", "loads.cutting.force.0.sine.period_s", 0.4, 0.6,
+     "limb1.drive.force.max"},
     {"a number of one witness", "spr_tripod/random", "reference.parameters.m_platform", 29.0, 31.0,
      "leg1.force.max"},
     {"a tolerance",
@@ -454,6 +473,7 @@ TEST_F(ScenarioMemoryTest, AnyKindOfNumberGivesWhatItsCommandGives) {
     int exit_code = 0;
     const auto bench = StudyBench::Make(study, &diagnostics, &exit_code);
     ASSERT_TRUE(bench) << diagnostics.Text();
+    EXPECT_EQ(bench->keeps(), study.factors[0].key.starts_with("loads."));
     std::set<std::string> values;
     int refused = 0;
     for (std::uint64_t k = 0; k < 16; ++k) {
