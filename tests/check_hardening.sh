@@ -13,6 +13,7 @@ readelf -dW "$program" | has 'BIND_NOW|FLAGS_1.* NOW' || lack 'symbols are bound
 readelf -lW "$program" | has GNU_RELRO || lack 'no GNU_RELRO'
 readelf -hW "$program" | has 'Type: *DYN' || lack 'no position-independent executable'
 ! readelf -dW "$program" | has 'NEEDED.*libOSMesa' || lack 'it loads OSMesa before the first picture'
+! readelf -dW "$program" | has '(RPATH|RUNPATH).*(\[:|::|:\]|\[\])' || lack 'it looks for libraries where it is called'
 symbols=$(readelf --dyn-syms -W "$program")
 echo "$symbols" | has ' __stack_chk_fail' || lack 'no stack protector (__stack_chk_fail)'
 echo "$symbols" | has '__glibcxx_assert_fail' || lack 'no _GLIBCXX_ASSERTIONS'

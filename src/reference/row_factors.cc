@@ -35,11 +35,9 @@ void RowFactors::Factor(const RowSet& rows) {
     return;
   }
   const bool sparse = system_.size() > largest_dense_ && FactorSparse();
-  const double singular_value = pivot_;
-  if (sparse && pivot_ > kFirm) return;
+  if (sparse) return;
   sparse_.reset();
   FactorDense();
-  if (sparse) pivot_ = singular_value;
 }
 
 void RowFactors::FactorDense() {
@@ -64,21 +62,34 @@ bool RowFactors::FactorSparse() {
     const Eigen::HouseholderQR<MatX> qr(basis_);
     basis_ = qr.householderQ() * MatX::Identity(basis_.rows(), basis_.cols());
   }
-  soft_.resize(system_.size());
-  for (Eigen::Index i = 0; i < soft_.size(); ++i) {
-    soft_[i] = 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i));  // a share in every direction
-  }
-  double longest = 0.0, singular_value = 1.0;
+  double longest = 0.0;
   for (int k = 0; k < J.cols(); ++k) longest = std::max(longest, J.col(k).norm());
-  soft_ = WithoutBasis(soft_);
-  for (int i = 0; i < kIterations && independent_ > 0; ++i) {
-    soft_.normalize();
-    soft_ = WithoutBasis(sparse_->SolveNormal(soft_));
-    singular_value = 1.0 / std::sqrt(soft_.norm());
+  // Long rows of loops have some weak motions, as σ ~ 1/loops².
+  weak_.resize(system_.size(), 0);
+  pivot_ = 1.0 / longest;
+  for (Eigen::Index k = 0; independent_ > k; ++k) {
+    VecX motion(system_.size());
+    for (Eigen::Index i = 0; i < motion.size(); ++i) {
+      motion[i] = 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i));  // a share in every direction
+    }
+    motion = WithoutBasis(motion);
+    double singular_value = 1.0;
+    for (int i = 0; i < kIterations; ++i) {
+      motion -= weak_ * (weak_.transpose() * motion);
+      motion.normalize();
+      motion = WithoutBasis(sparse_->SolveNormal(motion));
+      singular_value = 1.0 / std::sqrt(motion.norm());
+    }
+    motion -= weak_ * (weak_.transpose() * motion);
+    motion.normalize();
+    const double pivot = singular_value / longest;
+    if (!std::isfinite(pivot)) return false;
+    if (k == 0) soft_ = motion, pivot_ = pivot;
+    if (pivot > kFirm) return true;
+    weak_.conservativeResize(Eigen::NoChange, k + 1);
+    weak_.col(k) = motion;
   }
-  soft_.normalize();
-  pivot_ = singular_value / longest;
-  return std::isfinite(pivot_);
+  return true;
 }
 
 VecX RowFactors::WithoutBasis(const VecX& V) const { return V - basis_ * (basis_.transpose() * V); }
@@ -109,6 +120,7 @@ VecX RowFactors::LeastMotion(const VecX& rates, bool firm) const {
     for (int i = 0; i < kRefinements; ++i) {
       motion += sparse_->SolveNormal(columns_ * (scaled - columns_.transpose() * motion));
     }
+    if (firm) motion -= weak_ * (weak_.transpose() * motion);
     return system_.body_scale().cwiseProduct(WithoutBasis(motion));
   }
   if (columns_.size() == 0) return motion;

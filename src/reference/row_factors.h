@@ -5,9 +5,8 @@
 //   V = J⁺ r           (of least norm with J V = r)                                            (2)
 // Of few bodies by QR of Jᵀ with column pivoting. Of many by sparse QR of J (math/sparse.h), where
 // JᵀJ V = Jᵀr is solved by its R and refined, and its null space made orthonormal; the smallest
-// singular value follows from inverse iteration beside B. Sparse factors choose no rows. Where
-// singular values are too small for them, and where the rank is not the one expected, QR with
-// pivoting decides.
+// singular values follow from inverse iteration beside B. Sparse factors choose no rows. Where the
+// rank is not the one expected, QR with pivoting decides.
 #pragma once
 
 #include <Eigen/QR>
@@ -61,7 +60,8 @@ class RowFactors {
   std::optional<SparseRank> sparse_;     ///< of J
   Eigen::ColPivHouseholderQR<MatX> qr_;  ///< of Jᵀ, where sparse_ is not in use
   mutable MatX basis_;                   ///< B; empty: not made yet
-  VecX soft_;                            ///< with sparse_
+  VecX soft_;                            ///< with sparse_: what the weakest row holds
+  MatX weak_;                            ///< with sparse_: motions that weak rows alone hold
   double pivot_ = kNan, extra_ = 0.0;
 };
 

@@ -1,5 +1,6 @@
 // Time per step of the simulation of the four papers' mechanisms beside a bare mj_step loop on the
-// same model, and time per sample of inverse mode. Ratios: scripts/performance.
+// same model, and time per sample of inverse mode; of both what MuJoCo's own stages take that no
+// implementation on MuJoCo can leave out. Ratios: scripts/performance.
 
 #include <benchmark/benchmark.h>
 
@@ -50,8 +51,9 @@ void Run(benchmark::State& state, const std::string& scenario, SimulationOptions
   }
 }
 
-// mj_step and nothing else, sensors off, equalities at home.
-void BareMjStep(benchmark::State& state, const std::string& scenario) {
+// MuJoCo and nothing else on the model of a scenario, sensors off, equalities at home.
+template <typename Stages>
+void Bare(benchmark::State& state, const std::string& scenario, const Stages& stages) {
   Case of(scenario);
   std::vector<std::string> warnings;
   simulation::EngineSession session(&warnings);
@@ -60,7 +62,32 @@ void BareMjStep(benchmark::State& state, const std::string& scenario) {
   engine.m->opt.disableflags |= mjDSBL_SENSOR;
   engine.m->opt.enableflags = 0;
   const simulation::DataHandle data = simulation::MakeData(*engine.m);
-  for (auto _ : state) mj_step(engine.m.get(), data.get());
+  mj_step(engine.m.get(), data.get());
+  for (auto _ : state) stages(engine.m.get(), data.get());
+}
+
+// An inverse sample whose predicted positions need no second look.
+void StagesOfInverse(const mjModel* m, mjData* d) {
+  mj_kinematics(m, d);
+  mj_comPos(m, d);
+  mj_tendon(m, d);
+  mj_makeConstraint(m, d);
+  mj_comVel(m, d);
+  mj_rnePostConstraint(m, d);
+}
+
+// A forward step without contacts, actuators and MuJoCo's own integration.
+void StagesOfForward(const mjModel* m, mjData* d) {
+  mj_kinematics(m, d);
+  mj_comPos(m, d);
+  mj_tendon(m, d);
+  mj_makeConstraint(m, d);
+  mj_crb(m, d);
+  mj_factorM(m, d);
+  mj_comVel(m, d);
+  mj_rne(m, d, 0, d->qfrc_bias);
+  mj_fwdAcceleration(m, d);
+  mj_fwdConstraint(m, d);
 }
 
 const SimulationOptions kForward = {};
@@ -81,10 +108,15 @@ const int kRegistered = [] {
           ->Unit(benchmark::kMicrosecond)
           ->Iterations(2);
     };
-    benchmark::RegisterBenchmark(("mj_step/" + name).c_str(),
-                                 [=](benchmark::State& state) { BareMjStep(state, scenario); })
-        ->Unit(benchmark::kMicrosecond)
-        ->Iterations(4000);
+    const auto add_bare = [&](const std::string& what, void (*stages)(const mjModel*, mjData*)) {
+      benchmark::RegisterBenchmark((what + "/" + name).c_str(),
+                                   [=](benchmark::State& state) { Bare(state, scenario, stages); })
+          ->Unit(benchmark::kMicrosecond)
+          ->Iterations(4000);
+    };
+    add_bare("mj_step", &mj_step);
+    add_bare("stages_inverse", &StagesOfInverse);
+    add_bare("stages_forward", &StagesOfForward);
     add("forward", kForward);
     add("stock", kStock);
     add("inverse", kInverse);

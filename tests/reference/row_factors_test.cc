@@ -140,6 +140,20 @@ TEST(RowFactors, AnotherRankIsNoticed) {
   }
 }
 
+// A four-bar whose sides are parallel, at an angle from its flat pose.
+BodyStates Parallelogram(const Mechanism& mechanism, double angle) {
+  BodyStates states = Home(mechanism);
+  for (size_t b = 1; b < states.X_WB.size(); ++b) {
+    const bool coupler = mechanism.bodies[b].name == "coupler1";
+    const double a = coupler ? 0.0 : angle;
+    const double along = mechanism.bodies[b].name == "rocker1" ? 0.4 : 0.0;
+    states.X_WB[b].linear() = Eigen::AngleAxisd(a, Vec3::UnitZ()).toRotationMatrix();
+    states.X_WB[b].translation() =
+        coupler ? Vec3(0.2 * std::cos(angle), 0.2 * std::sin(angle), 0.0) : Vec3(along, 0, 0);
+  }
+  return states;
+}
+
 // Towards the flat pose of a parallelogram a constraint fades in proportion to the angle, by sparse
 // factors as by dense ones; what hardly holds is the same motion.
 TEST(RowFactors, AConstraintThatFadesIsSeen) {
@@ -147,16 +161,7 @@ TEST(RowFactors, AConstraintThatFadesIsSeen) {
   const double length = CharacteristicLength(mechanism);
   std::vector<double> pivots;
   for (const double angle : {1e-1, 1e-2, 1e-3}) {
-    BodyStates states = Home(mechanism);
-    for (size_t b = 1; b < states.X_WB.size(); ++b) {
-      const bool coupler = mechanism.bodies[b].name == "coupler1";
-      const double a = coupler ? 0.0 : angle;
-      const double along = mechanism.bodies[b].name == "rocker1" ? 0.4 : 0.0;
-      states.X_WB[b].linear() = Eigen::AngleAxisd(a, Vec3::UnitZ()).toRotationMatrix();
-      states.X_WB[b].translation() =
-          coupler ? Vec3(0.2 * std::cos(angle), 0.2 * std::sin(angle), 0.0) : Vec3(along, 0, 0);
-    }
-    const RowSet rows = RowsAt(mechanism, states);
+    const RowSet rows = RowsAt(mechanism, Parallelogram(mechanism, angle));
     RowFactors sparse(mechanism.bodies.size(), length, 1, 0),
         dense(mechanism.bodies.size(), length, 1);
     sparse.Factor(rows);
@@ -169,6 +174,35 @@ TEST(RowFactors, AConstraintThatFadesIsSeen) {
   }
   EXPECT_NEAR(pivots[1] / pivots[0], 0.1, 0.01);
   EXPECT_NEAR(pivots[2] / pivots[1], 0.1, 0.002);
+}
+
+// Near it the weak motion, and no other one, is left out where poses are corrected.
+TEST(RowFactors, FirmMotionsLackWhatHardlyHolds) {
+  const Mechanism mechanism = FourBarChain(1);
+  const double length = CharacteristicLength(mechanism);
+  const SquareSystem scales(mechanism.bodies.size(), length);
+  for (const double angle : {3e-3, 3e-5}) {
+    const RowSet rows = RowsAt(mechanism, Parallelogram(mechanism, angle));
+    const Values truth = ValuesOf(mechanism, rows, length);
+    RowFactors sparse(mechanism.bodies.size(), length, 1, 0);
+    sparse.Factor(rows);
+    const bool is_weak = angle < 1e-3;
+    ASSERT_EQ(sparse.pivot() < 1e-5, is_weak) << sparse.pivot();
+    ASSERT_GT(sparse.pivot(), 1e-6);
+    const VecX moved = VecX::LinSpaced(scales.size(), 1.0, -0.3);
+    VecX rates = truth.J * moved;
+    for (int i = 0; i < rows.size(); ++i) rates[i] /= scales.RowScale(rows.angular[i]);
+    const auto motion = [&](bool firm) -> VecX {
+      return sparse.LeastMotion(rates, firm).cwiseQuotient(scales.body_scale());
+    };
+    const MatX& V = truth.svd.matrixV();
+    const VecX left = V.col(truth.rank), weak = V.col(truth.rank - 1);
+    const VecX least = moved - left * left.dot(moved), share = weak * weak.dot(moved);
+    ASSERT_GT(share.norm(), 0.01 * moved.norm());
+    EXPECT_LT((motion(false) - least).norm(), 1e-6 * moved.norm()) << angle;
+    EXPECT_LT((motion(true) - (is_weak ? least - share : least)).norm(), 1e-6 * moved.norm())
+        << angle;
+  }
 }
 
 // Some drives follow commands, the others are pushed: reactions and the forces of the commanded

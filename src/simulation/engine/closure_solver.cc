@@ -42,8 +42,9 @@ constexpr double kShortestStep = 1e-4;
 constexpr double kRankTolerance = 1e-9;
 // A self-stress with a smaller share in a row does not act there.
 constexpr double kActs = 1e-6;
-// With more rows than velocities: of more velocities, factors are sparse.
-constexpr int kLargestDense = 6;
+// With more rows than velocities: of more velocities, factors are sparse. Where velocities are left
+// open, of many alone.
+constexpr int kLargestDense = 6, kFewVelocities = 100;
 
 // The shortest x with A x = b as well as can be, refined once.
 VecX LeastNorm(const MatX& A, const VecX& b) {
@@ -83,10 +84,56 @@ void ClosureSolver::Factor() {
     rank_ = nv;
     return;
   }
+  if (nv > kFewVelocities && FactorBeside()) {
+    factors_ = Factors::kBeside;
+    rank_ = nv - static_cast<int>(motions_.cols());
+    return;
+  }
   factors_ = Factors::kOrthogonal;
   cod_.setThreshold(kRankTolerance);
   cod_.compute(system_->ScaledJ());
   rank_ = static_cast<int>(cod_.rank());
+}
+
+// Where J leaves motions, rows are added that hold as many velocities: what J' x can be stays the
+// same, as motions may be added to x until it has none of these velocities, and Jᵀλ + Eᵀe = τ has
+// e = 0 where λ can balance τ.
+bool ClosureSolver::FactorBeside() {
+  const SparseRank rank(SparseLu::Matrix(columns_.transpose()), kRankTolerance);
+  if (!rank.clear()) return false;
+  const MatX basis = rank.NullSpace();
+  motions_ =
+      Eigen::HouseholderQR<MatX>(basis).householderQ() * MatX::Identity(basis.rows(), basis.cols());
+  Hold(rank);
+  least_.Reset();
+  return least_.Factor(SideBySide({&columns_, &held_rows_}), kRankTolerance);
+}
+
+// Velocities on which the others depend.
+void ClosureSolver::Hold(const SparseRank& rank) {
+  const std::vector<int> free = rank.FirmlyIndependent();
+  held_.clear();
+  for (int i = 0; i < system_->nv(); ++i) {
+    if (!std::ranges::binary_search(free, i)) held_.push_back(i);
+  }
+  held_rows_.resize(system_->nv(), static_cast<Eigen::Index>(held_.size()));
+  held_rows_.setZero();
+  for (size_t k = 0; k < held_.size(); ++k) {
+    held_rows_.insert(held_[k], static_cast<Eigen::Index>(k)) = 1.0;
+  }
+  held_rows_.makeCompressed();
+  least_here_.Reset();
+  soft_.resize(0);
+}
+
+VecX ClosureSolver::WithoutMotions(const VecX& x) const {
+  return x - motions_ * (motions_.transpose() * x);
+}
+
+// λ of least norm that balances what can be balanced of τ, both scaled.
+VecX ClosureSolver::LeastForces(const VecX& tau) const {
+  if (factors_ == Factors::kOverdefined) return least_.LeastNorm(tau);
+  return least_.LeastNorm(WithoutMotions(tau)).head(system_->rows());
 }
 
 // J = R J' D⁻¹ with the factored J', units R of the rows and D of the velocities.
@@ -102,6 +149,10 @@ void ClosureSolver::SolveInto(const VecX& b, VecX* x, int refinements) {
       break;
     case Factors::kOverdefined:
       scaled_ = least_.LeastSquares(scaled_, refinements);
+      break;
+    case Factors::kBeside:
+      scaled_.conservativeResizeLike(VecX::Zero(scaled_.size() + motions_.cols()));
+      scaled_ = WithoutMotions(least_.LeastSquares(scaled_, refinements));
       break;
     default:
       scaled_ = cod_.solve(scaled_).eval();
@@ -121,8 +172,8 @@ void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
     *x = scaled_.cwiseQuotient(row);
     return;
   }
-  if (factors_ == Factors::kOverdefined) {
-    *x = least_.LeastNorm(scaled_).cwiseQuotient(row);
+  if (factors_ == Factors::kOverdefined || factors_ == Factors::kBeside) {
+    *x = LeastForces(scaled_).cwiseQuotient(row);
     return;
   }
   const auto solve = [&](const VecX& right) -> VecX { return cod_.transpose().solve(right); };
@@ -242,16 +293,29 @@ void ClosureSolver::SolveForces(const VecX& tau) {
   system_->force() = rhs_;
 }
 
+// The same of the present J.
+bool ClosureSolver::FactorHere() {
+  system_->FillScaledTranspose(&columns_here_);
+  if (undriven() == 0) return least_here_.Factor(columns_here_, kRankTolerance);
+  if (system_->nv() <= kFewVelocities) return false;
+  if (static_cast<int>(held_.size()) != undriven()) {
+    Hold(SparseRank(SparseLu::Matrix(columns_here_.transpose()), kRankTolerance));
+    if (static_cast<int>(held_.size()) != undriven()) return false;
+  }
+  if (least_here_.Factor(SideBySide({&columns_here_, &held_rows_}), kRankTolerance)) return true;
+  held_.clear();
+  return false;
+}
+
 void ClosureSolver::RemoveSelfStress(VecX* force) {
   if (redundant() == 0) return;
   const VecX& unit = system_->row_unit();
-  if (undriven() == 0) {  // J x next to the force: rounding in x is not a self-stress
-    system_->FillScaledTranspose(&columns_here_);
-    if (least_here_.Factor(columns_here_, kRankTolerance)) {
-      const VecX x = least_here_.LeastSquares(force->cwiseProduct(unit), 0);
-      *force = (columns_here_.transpose() * x).cwiseQuotient(unit);
-      return;
-    }
+  if (FactorHere()) {  // J x next to the force: rounding in x is not a self-stress
+    VecX scaled = VecX::Zero(system_->rows() + undriven());
+    scaled.head(system_->rows()) = force->cwiseProduct(unit);
+    const VecX x = least_here_.LeastSquares(scaled, 0);
+    *force = (columns_here_.transpose() * x).cwiseQuotient(unit);
+    return;
   }
   const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
   VecX y = qr.householderQ().adjoint() * force->cwiseProduct(unit);
@@ -265,11 +329,51 @@ void ClosureSolver::SolveForcesHere(const VecX& tau) {
   system_->force() = force.cwiseQuotient(system_->row_unit());
 }
 
-double ClosureSolver::WeakestPivot() const {
+double ClosureSolver::WeakestPivot() {
   if (rank_ == 0) return 1.0;
+  for (int attempt = 0; attempt < 2 && undriven() > 0 && FactorHere(); ++attempt) {
+    const double weakest = WeakestByIteration();
+    if (!std::isnan(weakest)) return weakest;
+    held_.clear();
+  }
   const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ().transpose());
   const auto pivots = qr.matrixQR().diagonal();
   return std::abs(pivots[rank_ - 1]) / std::abs(pivots[0]);
+}
+
+// The least singular value of J' that is not zero, over its longest row, by inverse iteration
+// from where the last call ended. NaN where the velocities held are a poor choice here.
+double ClosureSolver::WeakestByIteration() {
+  constexpr int kFirst = 24, kNext = 3;
+  constexpr double kPoor = 1e4;
+  const int rows = system_->rows(), nv = system_->nv();
+  MatX motions(nv, undriven());
+  VecX right = VecX::Zero(rows + undriven());
+  for (int k = 0; k < undriven(); ++k) {
+    right.tail(undriven()) = VecX::Unit(undriven(), k);
+    motions.col(k) = least_here_.LeastSquares(right, 1);
+  }
+  if (!(motions.norm() < kPoor)) return kNan;
+  motions = Eigen::HouseholderQR<MatX>(motions).householderQ() * MatX::Identity(nv, undriven());
+  const int iterations = soft_.size() == 0 ? kFirst : kNext;
+  if (soft_.size() == 0) {
+    soft_.resize(nv);
+    for (Eigen::Index i = 0; i < soft_.size(); ++i) {
+      soft_[i] = 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i));  // a share in every direction
+    }
+  }
+  right.setZero();
+  for (int i = 0; i < iterations; ++i) {
+    soft_ -= motions * (motions.transpose() * soft_);
+    soft_.normalize();
+    right.head(rows) = least_here_.LeastNorm(soft_).head(rows);
+    soft_ = least_here_.LeastSquares(right, 0);
+  }
+  soft_ -= motions * (motions.transpose() * soft_);
+  soft_.normalize();
+  double longest = 0.0;
+  for (int i = 0; i < rows; ++i) longest = std::max(longest, columns_here_.col(i).norm());
+  return (columns_here_.transpose() * soft_).norm() / longest;
 }
 
 void ClosureSolver::SolveLeastDriven(const VecX& tau) {
@@ -311,7 +415,7 @@ MatX ClosureSolver::SelfStress() const {
 // What the projection on the null space leaves of row forces; of a unit force the length of a row
 // of its basis.
 double ClosureSolver::SelfStressIn(const VecX& force) const {
-  return (force - least_.LeastNorm(columns_ * force)).norm();
+  return (force - LeastForces(columns_ * force)).norm();
 }
 
 // Where random forces of all driven rows have no part in a self-stress, none of these rows has one:
@@ -333,7 +437,7 @@ bool ClosureSolver::DrivenRowsAreUnique() const {
 std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {
   std::vector<int> rows;
   if (redundant() == 0) return rows;
-  const bool sparse = factors_ == Factors::kOverdefined;
+  const bool sparse = factors_ == Factors::kOverdefined || factors_ == Factors::kBeside;
   if (sparse && DrivenRowsAreUnique()) return rows;
   const MatX self_stress = sparse ? MatX() : ScaledSelfStress();
   for (int i = system_->first_driven_row(); i < system_->rows(); ++i) {

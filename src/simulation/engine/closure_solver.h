@@ -66,8 +66,9 @@ class ClosureSolver {
   /// As SolveForces, for the present J; keeps rank and factors of the last configuration solved.
   void SolveForcesHere(const VecX& tau);
   /// Smallest over largest pivot of the present J among as many as the last configuration solved
-  /// had independent rows: 0 where a constraint is lost.
-  [[nodiscard]] double WeakestPivot() const;
+  /// had independent rows, of many velocities the least singular value that is not zero over the
+  /// longest row: 0 where a constraint is lost.
+  [[nodiscard]] double WeakestPivot();
 
   /// Takes the part out of row forces that does not act on the present configuration: what remains
   /// is J x for some x. As many dimensions as rows were redundant when last solved.
@@ -91,6 +92,12 @@ class ClosureSolver {
   [[nodiscard]] double SelfStressIn(const VecX& force) const;
   [[nodiscard]] bool DrivenRowsAreUnique() const;
   void Factor();
+  [[nodiscard]] bool FactorBeside();
+  [[nodiscard]] bool FactorHere();
+  void Hold(const SparseRank& rank);
+  [[nodiscard]] VecX WithoutMotions(const VecX& x) const;
+  [[nodiscard]] VecX LeastForces(const VecX& tau) const;
+  [[nodiscard]] double WeakestByIteration();
   void SolveInto(const VecX& b, VecX* x, int refinements = 1);  // x = J⁺ b
   void SolveTransposedInto(const VecX& b, VecX* x);             // x = (Jᵀ)⁺ b
 
@@ -99,6 +106,7 @@ class ClosureSolver {
     kNone,         // no rows
     kSquare,       // lu_: as many rows as velocities, of full rank
     kOverdefined,  // least_: many velocities, of full rank, and more rows
+    kBeside,       // least_, beside rows that hold some of many velocities: J leaves motions
     kOrthogonal,   // cod_
   };
   Factors factors_ = Factors::kNone;
@@ -109,6 +117,10 @@ class ClosureSolver {
   SparseLu::Matrix
       columns_here_;  // the same of the present J, where that moves on without Factor()
   SparseLeastNorm least_here_;
+  std::vector<int> held_;       // velocities held where J leaves motions
+  SparseLu::Matrix held_rows_;  // as columns
+  MatX motions_;                // orthonormal, of J'
+  VecX soft_;                   // what WeakestPivot() last found to hardly move a row
   Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
   VecX rhs_, step_, bias_, refinement_, scaled_;
   double moved_ = 0.0;  // by the last Close, in the units of ScaledJ(): sum of its largest entries
