@@ -25,9 +25,10 @@ using std::numbers::pi;
 constexpr size_t kMostNamed = 8;         // names in a message
 constexpr double kSingularHome = 1e-10;  // determinants of orthonormal motions below it are zero
 constexpr size_t kMostChecked = 24;
-constexpr double kMostError = 0.2;  // of both ways together, by the measure
-constexpr double kLong_s = 10.0;    // what takes longer is announced
-constexpr double kSamePose = 1e-8;  // of the reference [rad, characteristic lengths]
+constexpr double kMostError = 0.2;    // of both ways together, by the measure
+constexpr double kLong_s = 10.0;      // what takes longer is announced
+constexpr long kUsualFibres = 40000;  // times through a range that its sections of a solid cost
+constexpr double kSamePose = 1e-8;    // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 constexpr const char* kNameOne =
     "name a body or a frame by --output, joints or drives by --over, or state outputs: in the "
@@ -251,10 +252,6 @@ class QuestionReader {
       }
     }
     question_.settings.for_all = !arguments_.for_all.empty();
-    if (!ranged_.empty() && over_.size() > 2) {
-      Error("--over", "a range of further coordinates is asked of one or two free ones",
-            "hold one of the coordinates by --at");
-    }
   }
 
   void ReadFrom() {
@@ -709,16 +706,20 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
   }
   const double boundary_s =
       settings.over == 3
-          ? plan.closing_s * static_cast<double>(kEnoughClosings) / arguments.flood.threads
+          ? plan.closing_s *
+                static_cast<double>(settings.ranged.empty() ? kEnoughClosings : kUsualFibres) /
+                arguments.flood.threads
           : 0.0;
   if (which.lattice && which.announce && plan.estimate_s + boundary_s > kLong_s) {
-    which.announce(fmt::format(
-        "the lattice takes about {}{}", TimeText(plan.estimate_s),
-        settings.over == 3
-            ? fmt::format(
+    const std::string boundary =
+        settings.over < 3 ? ""
+        : !settings.ranged.empty()
+            ? fmt::format(", the boundary about {}", TimeText(boundary_s))
+            : fmt::format(
                   ", the boundary up to {} (a million poses; six where its sections change)",
-                  TimeText(boundary_s))
-            : ""));
+                  TimeText(boundary_s));
+    which.announce(
+        fmt::format("the lattice takes about {}{}", TimeText(plan.estimate_s), boundary));
   }
   // Both ways at once; neither knows of the other.
   FloodSettings flood = arguments.flood;

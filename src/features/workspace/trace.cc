@@ -1704,10 +1704,11 @@ TracedSet TraceLine(const PoseSpace& space, const PlacedPose& home) {
   return set;
 }
 
-TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds) {
+TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds, double height) {
   TracedSet set;
   Tracer tracer(space);
   TracedSection section;
+  section.height = height;
   const bool found = tracer.TraceAll(seeds, &section, &set.inside) &&
                      tracer.Probe(PointsIn(section), &section, &set.inside);
   if (tracer.unbounded()) return Unbounded(set);
@@ -1726,8 +1727,13 @@ TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds
 
 }  // namespace
 
-TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside) {
-  return space.over() == 1 ? TraceLine(space, inside.front()) : TraceArea(space, inside);
+TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside, double height) {
+  return space.over() == 1 ? TraceLine(space, inside.front()) : TraceArea(space, inside, height);
+}
+
+std::optional<SpacePose> EndOfWay(const PoseSpace& space, const PlacedPose& from, const VecX& ray) {
+  const auto hit = Tracer(space).Walk(from, ray);
+  return hit ? std::optional(hit->at.pose) : std::nullopt;
 }
 
 TracedArc Resampled(const TracedArc& arc, int finer) {
