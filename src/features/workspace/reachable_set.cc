@@ -14,6 +14,7 @@
 #include "features/workspace/fibre.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
+#include "mechanism/idle_spins.h"
 #include "model_file/yaml/units.h"
 #include "reference/reduced_model.h"
 
@@ -41,12 +42,46 @@ struct Assigned {
   UnitSuffix unit = kPlain;
 };
 
+// Makes parts between two balls symmetric about the line through these whose spins are idle but for
+// that: centres of mass move onto it, inertias are averaged. Nothing else feels their turn where
+// only places are asked; held at a joint's coordinate they would end sets. The parts' names.
+std::vector<std::string> MakeSymmetric(Mechanism* mechanism) {
+  std::vector<std::string> names;
+  for (const Spin& spin : FindSpins(*mechanism)) {
+    if (spin.why_not.empty()) continue;
+    Mechanism even = *mechanism;
+    const Pose& X_WB0 = even.X_WB_home[static_cast<size_t>(spin.bodies[0])];
+    const Vec3 p_WP = X_WB0 * spin.p_BP, n_W = X_WB0.linear() * spin.n_B;
+    for (const int b : spin.bodies) {
+      Body& body = even.bodies[static_cast<size_t>(b)];
+      const Pose X_BW = even.X_WB_home[static_cast<size_t>(b)].inverse();
+      const Vec3 p = X_BW * p_WP, n = X_BW.linear() * n_W;
+      body.p_BoBcm_B = p + n * n.dot(body.p_BoBcm_B - p);
+      const double along = n.dot(body.I_Bcm_B * n);
+      const double round = 0.5 * (body.I_Bcm_B.trace() - along);
+      body.I_Bcm_B = round * Mat3::Identity() + (along - round) * n * n.transpose();
+    }
+    const std::vector<Spin> idle = IdleSpins(even);
+    if (std::ranges::find(idle, spin.balls, &Spin::balls) == idle.end()) continue;
+    *mechanism = std::move(even);
+    names.push_back(spin.name);
+  }
+  return names;
+}
+
 class QuestionReader {
  public:
   QuestionReader(const Mechanism& mechanism, const SetArguments& arguments,
                  Diagnostics* diagnostics)
       : arguments_(arguments), diagnostics_(*diagnostics) {
     question_.mechanism = mechanism;
+    const std::vector<std::string> even = MakeSymmetric(&question_.mechanism);
+    if (!even.empty()) {
+      question_.notes.push_back(
+          "taken as symmetric about the line through their balls, about which they turn by "
+          "themselves: " +
+          Joined(even, kMostNamed));
+    }
   }
 
   std::optional<SetQuestion> Read() {

@@ -133,6 +133,67 @@ TEST(ReachableSet, ABoxEndsALongWay) {
   ExpectMeasure(answer, 9.5, 1e-9);
 }
 
+// A disc whose boundary takes 600 rad of the screws.
+TEST(ReachableSet, ABoundaryAlongWhichScrewsTurnFastComesBack) {
+  const Answer answer = Ask(FromText(R"(
+name: screws
+parameters: {lead: {value: 0.02, unit: m}}
+bodies:
+  bridge: {mass: 1, inertia: [1, 1, 1]}
+  tool: {mass: 1, inertia: [1, 1, 1]}
+  screw1: {mass: 1, inertia: [1, 1, 1]}
+  screw2: {mass: 1, inertia: [1, 1, 1]}
+world: {frames: {centre: [0.02, -0.01, 0.05]}}
+joints:
+  x: {kind: prismatic, parent: world, child: bridge, axis: x}
+  y: {kind: prismatic, parent: bridge, child: tool, axis: y}
+  screw1: {kind: revolute, parent: world, child: screw1, axis: x}
+  screw2: {kind: revolute, parent: bridge, child: screw2, axis: y}
+couplings:
+  thread1: {joint: screw1, follows: x, ratio: 2*pi/lead}
+  thread2: {joint: screw2, follows: y, ratio: 2*pi/lead}
+drives:
+  screw1: {kind: joint, joint: screw1}
+  screw2: {kind: joint, joint: screw2}
+  reach: {kind: distance, from: world.centre, to: tool, range: [-1, 0.25]}
+outputs: {tool: tool}
+)"),
+                            Over({"x", "y"}, 40));
+  ExpectMeasure(answer, pi * (0.25 * 0.25 - 0.05 * 0.05), 1e-9);
+}
+
+// A rod between two balls turns about their line by itself, whatever its mass: nothing is held.
+TEST(ReachableSet, ARodWhoseMassIsBesideItsLineIsHeldByNothing) {
+  const std::string text = R"(
+name: ball_rod
+bodies:
+  crank: {mass: 1, inertia: [1, 1, 1], frames: {pin: [0.1, 0, 0]}}
+  rod: {mass: 1, com: [0.1, 0.03, 0], inertia: [0.01, 0.02, 0.02], frames: {end: [0.3, 0, 0]}}
+  slider: {mass: 1, inertia: [1, 1, 1]}
+world: {frames: {way: [0, 0, 0.05]}}
+joints:
+  shaft: {kind: revolute, parent: world, child: crank, axis: z, guess: 0.5}
+  A: {kind: spherical, parent: crank.pin, child: rod}
+  slide: {kind: prismatic, parent: world.way, child: slider, axis: x, guess: 0.38}
+  B: {kind: spherical, parent: rod.end, child: slider, closure: true}
+drives: {shaft: {kind: joint, joint: shaft}}
+outputs: )";
+  const Answer answer = Ask(FromText(text + "{slider: slider}"), Over({"x"}, 100));
+  ASSERT_EQ(answer.set.traced.ends.size(), 2u) << answer.diagnostics.Text() << answer.set.verdict;
+  EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
+  EXPECT_EQ(answer.set.dofs, 1);
+  EXPECT_THAT(answer.set.notes, testing::Contains(HasSubstr("by themselves: rod")));
+  const double middle = std::sqrt(0.3 * 0.3 - 0.05 * 0.05);
+  EXPECT_NEAR(answer.set.traced.ends[0].first, middle - 0.1, 1e-10);
+  EXPECT_NEAR(answer.set.traced.ends[1].first, middle + 0.1, 1e-10);
+  // Where its own poses are asked they show the turn.
+  Diagnostics diagnostics;
+  const auto question =
+      ReadQuestion(FromText(text + "{slider: slider, rod: rod}"), Over({"slider.x"}), &diagnostics);
+  ASSERT_TRUE(question.has_value()) << diagnostics.Text();
+  EXPECT_EQ(question->settings.coordinates.size(), 2u);
+}
+
 // cos θ1 cos θ2 > cos α.
 TEST(ReachableSet, AConeOfAUniversalJointIsACone) {
   const Mechanism joint = FromText(R"(
