@@ -8,6 +8,7 @@
 #include <future>
 #include <map>
 #include <numbers>
+#include <set>
 
 #include "base/text.h"
 #include "base/worker_pool.h"
@@ -29,6 +30,7 @@ constexpr size_t kMostChecked = 24;
 constexpr double kMostError = 0.2;    // of both ways together, by the measure
 constexpr double kLong_s = 10.0;      // what takes longer is announced
 constexpr long kUsualFibres = 40000;  // times through a range that its sections of a solid cost
+constexpr double kWeakLoops = 0.1;    // of what they hold with at home: near where branches cross
 constexpr double kSamePose = 1e-8;    // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 constexpr const char* kNameOne =
@@ -401,16 +403,40 @@ class QuestionReader {
     for (const NamedCoordinate& named : at_) add(named);
     const size_t stated = candidates.size();
     for (const Prescribed& prescribed : m.prescribed) add(*Find(prescribed.name));
+    // Of drives and joints that are asked, the other drives rest; else the output does.
+    const bool of_output = std::ranges::any_of(over_, [](const NamedCoordinate& named) {
+      return named.coordinate.kind == Coordinate::Kind::kOutput;
+    });
+    const auto add_drives = [&] {
+      for (const Drive& drive : m.drives) add(*Find(drive.name));
+    };
+    if (!of_output) add_drives();
     if (!output_.empty()) {
       for (const char* component : kComponents) add(*Find(output_ + "." + component));
     }
-    for (const Drive& drive : m.drives) add(*Find(drive.name));
+    add_drives();
     const size_t preferred = candidates.size();
-    for (const NamedCoordinate& named : known_) add(named);
-    std::vector<Coordinate> coordinates;
-    coordinates.reserve(candidates.size());
-    for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
-    const CoordinateChoice choice = ChooseCoordinates(m, coordinates, preferred);
+    // Balls of rods, whose own turn depends on the way, only where nothing else holds it.
+    std::set<int> balls;
+    for (const Spin& spin : IdleSpins(m)) balls.insert(spin.balls.begin(), spin.balls.end());
+    const auto of_rod = [&](const NamedCoordinate& named) {
+      return named.coordinate.kind == Coordinate::Kind::kJoint &&
+             balls.contains(named.coordinate.index);
+    };
+    for (const NamedCoordinate& named : known_) {
+      if (!of_rod(named)) add(named);
+    }
+    const auto choose = [&] {
+      std::vector<Coordinate> coordinates;
+      coordinates.reserve(candidates.size());
+      for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
+      return ChooseCoordinates(m, coordinates, preferred);
+    };
+    CoordinateChoice choice = choose();
+    if (choice.left() > 0) {
+      for (const NamedCoordinate& named : known_) add(named);
+      choice = choose();
+    }
     if (choice.dofs == 0) {
       Error(m.file, "the model has no degree of freedom at home", "see mbverify model");
       return false;
@@ -639,6 +665,23 @@ std::string UnitOfMeasure(const std::vector<std::string>& units) {
   return text;
 }
 
+// What both ways found is ambiguous: which branch is followed depends on the way.
+std::string ConflictText(const ReachableSet& set) {
+  std::string text =
+      fmt::format("{} poses of the lattice are reached in two ways", set.flooded.conflicts);
+  if (!(set.flooded.conflict_margin < kWeakLoops)) return text;
+  std::vector<std::string> places;
+  for (size_t c = 0; c < set.over.size(); ++c) {
+    places.push_back(fmt::format("{} = {:.4g} {}", set.over[c],
+                                 set.flooded.conflict_at[static_cast<Eigen::Index>(c)],
+                                 set.over_units[c]));
+  }
+  return text + fmt::format(
+                    ", branches of which cross at a constraint singularity near {}: state a box "
+                    "that leaves it out, --over NAME=LOW:HIGH",
+                    Joined(places));
+}
+
 }  // namespace
 
 void JudgeSet(ReachableSet* result) {
@@ -657,8 +700,7 @@ void JudgeSet(ReachableSet* result) {
   result->agree = off <= error && sharp && flooded.conflicts == 0 && result->checked > 0 &&
                   result->checked_off < kSamePose;
   result->verdict =
-      flooded.conflicts > 0
-          ? fmt::format("{} poses of the lattice are reached in two ways", flooded.conflicts)
+      flooded.conflicts > 0  ? ConflictText(*result)
       : result->checked == 0 ? "the reference reaches none of the poses inside"
       : result->checked_off >= kSamePose
           ? fmt::format(

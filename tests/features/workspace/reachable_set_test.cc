@@ -162,6 +162,40 @@ outputs: {tool: tool}
   ExpectMeasure(answer, pi * (0.25 * 0.25 - 0.05 * 0.05), 1e-9);
 }
 
+TEST(ReachableSet, OfDrivesThatAreAskedTheOthersRest) {
+  Diagnostics diagnostics;
+  const auto held = [&](const std::vector<std::string>& over) {
+    const auto question = ReadQuestion(ShippedModel("stewart"), Over(over), &diagnostics);
+    EXPECT_TRUE(question.has_value()) << diagnostics.Text();
+    std::vector<std::string> names;
+    for (const NamedCoordinate& named : question->settings.coordinates) names.push_back(named.name);
+    names.erase(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(over.size()));
+    return names;
+  };
+  EXPECT_THAT(held({"leg1.length", "leg2.length"}),
+              testing::ElementsAre("leg3.length", "leg4.length", "leg5.length", "leg6.length"));
+  EXPECT_THAT(held({"x", "leg2.length"}),
+              testing::ElementsAre("platform.y", "platform.z", "platform.roll", "platform.pitch"));
+}
+
+TEST(ReachableSet, PosesThatAreReachedInTwoWaysAreNamedWhereBranchesCross) {
+  ReachableSet set;
+  set.over = {"tool.x", "tool.y"};
+  set.over_units = {"m", "m"};
+  set.traced.summary = set.flooded.summary = RunSummary::Done();
+  set.flooded.conflicts = 3;
+  set.flooded.conflict_at = Vec3(0.25, -0.5, 0.0);
+  for (const double margin : {0.01, 0.9}) {
+    set.flooded.conflict_margin = margin;
+    JudgeSet(&set);
+    EXPECT_FALSE(set.agree);
+    EXPECT_THAT(set.verdict, HasSubstr("3 poses of the lattice are reached in two ways"));
+    EXPECT_EQ(set.verdict.find("constraint singularity near tool.x = 0.25 m, tool.y = -0.5 m") !=
+                  std::string::npos,
+              margin < 0.1);
+  }
+}
+
 // A rod between two balls turns about their line by itself, whatever its mass: nothing is held.
 TEST(ReachableSet, ARodWhoseMassIsBesideItsLineIsHeldByNothing) {
   const std::string text = R"(
