@@ -220,6 +220,20 @@ outputs: )";
   const double middle = std::sqrt(0.3 * 0.3 - 0.05 * 0.05);
   EXPECT_NEAR(answer.set.traced.ends[0].first, middle - 0.1, 1e-10);
   EXPECT_NEAR(answer.set.traced.ends[1].first, middle + 0.1, 1e-10);
+  // A telescopic one, whose length nothing holds: the crank rests, not a ball, which turns more.
+  std::string telescopic = text + "{slider: slider}";
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    telescopic.replace(telescopic.find(from), from.size(), to);
+  };
+  replace("  slider: {mass", "  tube: {mass: 1, inertia: [1, 1, 1]}\n  slider: {mass");
+  replace("child: rod}",
+          "child: tube}\n  stroke: {kind: prismatic, parent: tube, child: rod, axis: x}");
+  replace("drives: {shaft: {kind: joint, joint: shaft}}\n", "");
+  Diagnostics of_telescopic;
+  const auto longer = ReadQuestion(FromText(telescopic), Over({"x"}), &of_telescopic);
+  ASSERT_TRUE(longer.has_value()) << of_telescopic.Text();
+  ASSERT_EQ(longer->settings.coordinates.size(), 2u);
+  EXPECT_THAT(longer->settings.coordinates[1].name, testing::AnyOf("shaft", "stroke"));
   // Where its own poses are asked they show the turn.
   Diagnostics diagnostics;
   const auto question =
