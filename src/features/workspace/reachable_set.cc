@@ -27,11 +27,11 @@ using std::numbers::pi;
 constexpr size_t kMostNamed = 8;         // names in a message
 constexpr double kSingularHome = 1e-10;  // determinants of orthonormal motions below it are zero
 constexpr size_t kMostChecked = 24;
-constexpr double kMostError = 0.2;    // of both ways together, by the measure
-constexpr double kLong_s = 10.0;      // what takes longer is announced
-constexpr long kUsualFibres = 40000;  // times through a range that its sections of a solid cost
-constexpr double kWeakLoops = 0.1;    // of what they hold with at home: near where branches cross
-constexpr double kSamePose = 1e-8;    // of the reference [rad, characteristic lengths]
+constexpr double kMostError = 0.2;     // of both ways together, by the measure
+constexpr double kLong_s = 10.0;       // what takes longer is announced
+constexpr long kUsualFibres = 100000;  // times through a range that its sections of a solid cost
+constexpr double kWeakLoops = 0.1;     // of what they hold with at home: near where branches cross
+constexpr double kSamePose = 1e-8;     // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 constexpr const char* kNameOne =
     "name a body or a frame by --output, joints or drives by --over, or state outputs: in the "
