@@ -1,7 +1,9 @@
-// Constraint singularities inside a set of two or three dimensions: curves or surfaces where the
-// joints alone lose rank [Zlatanov, Bonev, Gosselin 2002], which the set passes unnoticed.
+// Singularities inside a set, which goes on beyond: of two or three dimensions curves or surfaces
+// where the joints alone lose rank [Zlatanov, Bonev, Gosselin 2002], which it passes unnoticed, and
+// of three those where the drives lose their hold (type 2), where it may cross them.
 //
 //   e = det [A_s; Nᵀ] / (its value at the set's start)                                         (1)
+//   e = det D, of type 2 (pose_space.h, 3)                                                      (2)
 //
 // A_s: rows of the loops (pose_space.h, 1) that are independent at home, N: the motions. N goes on
 // smoothly through such a pose, A_s loses rank there, and e changes its sign. Between neighbours of
@@ -26,6 +28,7 @@ namespace {
 
 constexpr double kIndependent = 1e-9;  // pivots below this share of the first are none
 constexpr double kLessNear = 0.7;      // of the last pivot three times as near; by its slope 0.3
+constexpr double kFound = 1e-10;       // of its values at two corners, where (2) vanishes
 
 class LoopDeterminant {
  public:
@@ -110,18 +113,21 @@ class LatticeZeros {
  public:
   using Key = std::array<long, 3>;
 
-  explicit LatticeZeros(const SetQuestion& question)
-      : space_(question.mechanism, question.settings), determinant_(space_) {}
+  LatticeZeros(const SetQuestion& question, SetBound::Kind kind)
+      : space_(question.mechanism, question.settings), kind_(kind), determinant_(space_) {}
 
   bool Begin(const ReachableSet& set) {
     PlacedPose start;
     if (!space_.Home(&start) || !space_.Place(set.start_pose, &start)) return false;
     space_.CountFrom(&start);
-    if (!determinant_.Begin(start)) return false;
+    if (kind_ == SetBound::Kind::kConstraint ? !determinant_.Begin(start)
+                                             : !std::isfinite(start.type2)) {
+      return false;
+    }
     for (const FloodPoint& point : set.flooded.lattice) {
       Corner corner;
       if (!point.inside || !space_.Place(point.pose, &corner.at)) continue;
-      corner.e = determinant_.At(corner.at);
+      corner.e = At(corner.at);
       Key key{};
       for (int c = 0; c < space_.over(); ++c) {
         key.at(static_cast<size_t>(c)) = std::lround(
@@ -162,12 +168,33 @@ class LatticeZeros {
     double e = kNan;
   };
 
+  // (1) or (2).
+  [[nodiscard]] double At(const PlacedPose& at) const {
+    return kind_ == SetBound::Kind::kConstraint ? determinant_.At(at) : at.type2;
+  }
+
   [[nodiscard]] std::optional<Vec3> Find(const Key& k1, const Key& k2) const {
     const auto a = corners_.find(k1), b = corners_.find(k2);
     if (a == corners_.end() || b == corners_.end() || (a->second.e < 0.0) == (b->second.e < 0.0)) {
       return std::nullopt;
     }
     const VecX from = a->second.at.pose.at, way = b->second.at.pose.at - from;
+    Vec3 node = Vec3::Zero();
+    if (kind_ == SetBound::Kind::kType2) {
+      double s = kNan;
+      const auto e_at = [&](double share, double* e) {
+        PlacedPose there;
+        if (!space_.Close(a->second.at, from + share * way, &there)) return false;
+        s = share;
+        *e = there.type2;
+        return true;
+      };
+      const double size = std::max(std::abs(a->second.e), std::abs(b->second.e));
+      const auto enough = [&](double e, double) { return std::abs(e) <= kFound * size; };
+      if (!FindCrossing(0.0, a->second.e, 1.0, b->second.e, e_at, enough)) return std::nullopt;
+      node.head(space_.over()) = (from + s * way).head(space_.over());
+      return node;
+    }
     // On this line, from the corner on the same side; very near the curve poses do not close.
     const auto look = [&](double s, bool first, double* e, double* pivot) {
       PlacedPose there;
@@ -198,12 +225,12 @@ class LatticeZeros {
       // All rows together lose rank there, not the chosen ones alone.
       if (reach < 0.2 && std::abs(step) < 1e-3 && near > kLessNear * far) return std::nullopt;
     }
-    Vec3 node = Vec3::Zero();
     node.head(space_.over()) = (from + root * way).head(space_.over());
     return node;
   }
 
   PoseSpace space_;
+  const SetBound::Kind kind_;
   LoopDeterminant determinant_;
   std::map<Key, Corner> corners_;
   std::map<std::pair<Key, Key>, std::optional<Vec3>> nodes_;
@@ -212,7 +239,7 @@ class LatticeZeros {
 }  // namespace
 
 std::vector<TracedArc> ConstraintCurves(const SetQuestion& question, const ReachableSet& set) {
-  LatticeZeros zeros(question);
+  LatticeZeros zeros(question, SetBound::Kind::kConstraint);
   std::vector<TracedArc> arcs;
   if (question.settings.over != 2 || !zeros.Begin(set)) return arcs;
   for (const auto& [i, j, unused] : zeros.keys()) {
@@ -229,11 +256,15 @@ std::vector<TracedArc> ConstraintCurves(const SetQuestion& question, const Reach
   return arcs;
 }
 
-TriangleMesh ConstraintSurface(const SetQuestion& question, const ReachableSet& set) {
+TriangleMesh SingularSurface(const SetQuestion& question, const ReachableSet& set,
+                             SetBound::Kind kind) {
   using Key = LatticeZeros::Key;
-  LatticeZeros zeros(question);
+  LatticeZeros zeros(question, kind);
   TriangleMesh mesh;
-  if (question.settings.over != 3 || !zeros.Begin(set)) return mesh;
+  // A set that ends at type 2 has none inside.
+  const bool ends = kind == SetBound::Kind::kType2 &&
+                    std::ranges::find(set.bounds, kind, &SetBound::kind) != set.bounds.end();
+  if (question.settings.over != 3 || ends || !zeros.Begin(set)) return mesh;
   std::map<std::pair<Key, Key>, int> vertices;
   // The vertex between two corners, −1 without.
   const auto vertex = [&](const Key& one, const Key& other) {

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <chrono>
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
+#include <set>
 #include <thread>
 
 namespace mbv {
@@ -23,6 +26,14 @@ constexpr size_t kMostValues = 700;           // sections at most
 constexpr double kRests = 1e-5;               // a change by this share of the measure is enough
 constexpr int kLines = 4095,
               kFiner = 16;  // scan lines, of three each the middle one; points for each node
+// Of a solid: its sections rest by this share of the largest one, its volume by this of it, or with
+// this number of sections.
+constexpr double kSectionRests = 1e-4, kRuleRests = 3e-4;
+constexpr size_t kMostRangeSections = 200;
+constexpr double kSliverOfPart = 1e-3;                    // of a part that is divided
+constexpr size_t kPosesBeside = 12, kSectionsBeside = 1;  // that begin another section
+constexpr int kMostClimbs = 12, kClimbRows = 5;           // to its end
+constexpr double kBelow = 1e-3;                           // an end, by the last gain
 
 // Of the parabola through three points.
 struct Parabola {
@@ -182,6 +193,19 @@ namespace {
 
 using ValueKey = std::array<int, 3>;  // of the finest grid of the range
 using Spans = std::vector<std::pair<double, double>>;
+using PosesOfValues = std::map<ValueKey, std::vector<SpacePose>>;
+
+// work(i) for all i, on all threads.
+void OnThreads(size_t count, int threads, const std::function<void(size_t)>& work) {
+  std::atomic<size_t> next = 0;
+  const auto run = [&] {
+    for (size_t i = next++; i < count; i = next++) work(i);
+  };
+  std::vector<std::thread> others;
+  for (int t = 1; t < threads && static_cast<size_t>(t) < count; ++t) others.emplace_back(run);
+  run();
+  for (std::thread& other : others) other.join();
+}
 
 Spans Combined(const Spans& a, const Spans& b, bool intersect) {
   Spans result;
@@ -213,29 +237,33 @@ bool Contains(const Spans& spans, double x) {
                              [&](const auto& span) { return x >= span.first && x <= span.second; });
 }
 
-// The boundary at values of the range, and what they have in common, or together.
+// The boundary at values of the range, and what they have in common, or together: of one or two
+// free coordinates, or of a solid's section, which rests at a change of its area by `rests`.
 class RangeTracer {
  public:
   RangeTracer(const PoseSpace& space, const PlacedPose& start, int threads,
-              const std::function<void(double)>& progress, ResultLog log)
+              const std::function<void(double)>& progress, ResultLog* log, double height = kNan,
+              PosesOfValues beside = {}, double rests = 0.0)
       : space_(space),
         settings_(space.settings()),
         start_(start),
         threads_(threads),
         progress_(progress),
         count_(settings_.ranged.size()),
-        log_(std::move(log)) {}
+        log_(log),
+        height_(height),
+        rests_(rests),
+        beside_(std::move(beside)) {}
 
   TracedSet Trace() {
-    if (space_.over() > 2) {
-      set_.summary.stop = Stop::kUnsupported;
-      set_.summary.message = "a range of further coordinates is asked of one or two free ones";
-      return std::move(set_);
-    }
     double before = kNan, change_before = kNan;
     for (int intervals = kFewestValues;; intervals *= 2) {
       spacing_ = kFinest / intervals;
       if (!TraceValues()) return std::move(set_);
+      if (empty_) {
+        set_.measure = set_.error = 0.0;
+        break;
+      }
       const double line_error = Measure();
       const double change = std::abs(set_.measure - before);
       // What is left, where changes go on to fall as they do: by 4, by 2 where a corner moves.
@@ -246,20 +274,54 @@ class RangeTracer {
       before = set_.measure;
       change_before = change;
       const double next = std::pow(2 * intervals + 1, static_cast<double>(count_));
-      if (change <= kRests * set_.measure || next > kMostValues || 2 * intervals > kFinest) break;
+      if (change <= std::max(kRests * set_.measure, rests_) || next > kMostValues ||
+          2 * intervals > kFinest) {
+        break;
+      }
     }
     Collect();
     set_.summary = RunSummary::Done();
     return std::move(set_);
   }
+  /// Behind Trace(): poses of each value, of which other sections begin.
+  [[nodiscard]] PosesOfValues Poses() const {
+    PosesOfValues poses;
+    for (const auto& [key, value] : values_) {
+      for (size_t i = 0; i < value.traced.inside.size(); i += StrideOf(value)) {
+        poses[key].push_back(value.traced.inside[i]);
+      }
+    }
+    return poses;
+  }
+  /// Some places all over what was found.
+  [[nodiscard]] std::vector<Vec2> Places() const {
+    std::vector<size_t> rows;
+    for (size_t row = 0; row < region_.size(); ++row) {
+      if (!region_[row].empty()) rows.push_back(row);
+    }
+    std::vector<Vec2> places;
+    for (int i = 0; i < kClimbRows && !rows.empty(); ++i) {
+      const size_t row = rows[rows.size() * static_cast<size_t>(2 * i + 1) / (2 * kClimbRows)];
+      for (const auto& [a, b] : region_[row]) {
+        for (const double share : {0.2, 0.5, 0.8}) {
+          places.emplace_back(a + share * (b - a), low_ + (static_cast<double>(row) + 0.5) * line_);
+        }
+      }
+    }
+    return places;
+  }
+  static constexpr int kFinest = 64;
 
  private:
-  static constexpr int kFinest = 64;
   struct AtValue {
     TracedSet traced;
     std::vector<Spans> rows = {};
   };
 
+  // Of its poses, those from which others begin.
+  [[nodiscard]] static size_t StrideOf(const AtValue& value) {
+    return value.traced.inside.size() / kPosesBeside + 1;
+  }
   [[nodiscard]] double ValueOf(const ValueKey& key, size_t r) const {
     const CoordinateRange& range = settings_.ranged[r].range;
     return range.lower + (range.upper - range.lower) * key.at(r) / kFinest;
@@ -282,7 +344,9 @@ class RangeTracer {
     all(all, 0);
     while (!open.empty()) {
       std::vector<ValueKey> wave, rest;
-      for (const ValueKey& k : open) (Neighbours(k).empty() ? rest : wave).push_back(k);
+      for (const ValueKey& k : open) {
+        (Neighbours(k).empty() && !beside_.contains(k) ? rest : wave).push_back(k);
+      }
       if (wave.empty()) {  // the first one: nearest to the start
         const auto far = [&](const ValueKey& k) {
           double sum = 0.0;
@@ -297,18 +361,9 @@ class RangeTracer {
         wave.push_back(*first);
         rest.erase(first);
       }
-      auto found = log_.Get<std::vector<TracedSet>>([&] {
+      auto found = log_->Get<std::vector<TracedSet>>([&] {
         std::vector<TracedSet> traced(wave.size());
-        std::atomic<size_t> next = 0;
-        const auto run = [&] {
-          for (size_t i = next++; i < wave.size(); i = next++) traced[i] = TraceAt(wave[i]);
-        };
-        std::vector<std::thread> others;
-        for (int t = 1; t < threads_ && static_cast<size_t>(t) < wave.size(); ++t) {
-          others.emplace_back(run);
-        }
-        run();
-        for (std::thread& other : others) other.join();
+        OnThreads(wave.size(), threads_, [&](size_t i) { traced[i] = TraceAt(wave[i]); });
         return traced;
       });
       for (size_t i = 0; i < wave.size(); ++i) {
@@ -319,8 +374,10 @@ class RangeTracer {
           return false;
         }
         largest_error_ = std::max(largest_error_, traced.error);
+        empty_ = empty_ || (settings_.for_all && traced.measure == 0.0);
         values_[wave[i]] = {std::move(traced)};
       }
+      if (empty_) return true;
       open = std::move(rest);
       if (progress_) {
         const double most = std::pow(kFinest + 1.0, static_cast<double>(count_));
@@ -351,23 +408,27 @@ class RangeTracer {
     for (size_t r = 0; r < count_; ++r) own.Hold(settings_.ranged[r].coordinate, ValueOf(key, r));
     const auto offer = [&](const SpacePose& pose) {
       PlacedPose from, to;
-      VecX target = pose.at;
-      for (size_t r = 0; r < count_; ++r) target[settings_.ranged[r].coordinate] = ValueOf(key, r);
+      const VecX target = own.Target(pose.at.head(own.over()));
       if (own.Place(pose, &from) && own.Close(from, target, &to) &&
           to.pose.margin.minCoeff() > 0.0) {
         seeds.push_back(std::move(to));
       }
     };
+    if (const auto near = beside_.find(key); near != beside_.end()) {
+      for (const SpacePose& pose : near->second) offer(pose);
+    }
     offer(start_.pose);
     for (const AtValue* neighbour : Neighbours(key)) {
-      for (const SpacePose& pose : neighbour->traced.inside) offer(pose);
+      const auto& poses = neighbour->traced.inside;
+      const size_t stride = std::isfinite(height_) ? StrideOf(*neighbour) : 1;
+      for (size_t i = 0; i < poses.size(); i += stride) offer(poses[i]);
     }
     TracedSet traced;
     if (seeds.empty()) {
       traced.summary = RunSummary::Done();
       traced.measure = traced.error = 0.0;
     } else {
-      traced = TraceFrom(own, seeds);
+      traced = TraceFrom(own, seeds, height_);
     }
     // The tracer went on from what `own` had counted.
     traced.closings = (seeds.empty() ? own.closings() : traced.closings) - before;
@@ -377,20 +438,25 @@ class RangeTracer {
   // The measure of all sections together; returns the scan lines' share of its error.
   double Measure() {
     const bool flat = space_.over() == 2;
+    line_ = 1.0;
     if (flat) {
-      low_ = std::numeric_limits<double>::infinity();
-      double high = -low_;
+      // Lines where all values, or some, have places.
+      constexpr double kFar = std::numeric_limits<double>::infinity();
+      std::vector<double> lows, highs;
       for (const auto& [key, value] : values_) {
+        double low = kFar, high = -kFar;
         ForEachArc(value, [&](const TracedArc& arc) {
           for (const Vec2& p : arc.points) {
-            low_ = std::min(low_, p[1]);
+            low = std::min(low, p[1]);
             high = std::max(high, p[1]);
           }
         });
+        lows.push_back(low);
+        highs.push_back(high);
       }
-      line_ = high > low_ ? (high - low_) / kLines : 1.0;
-    } else {
-      line_ = 1.0;
+      low_ = settings_.for_all ? std::ranges::max(lows) : std::ranges::min(lows);
+      const double high = settings_.for_all ? std::ranges::min(highs) : std::ranges::max(highs);
+      line_ = high > low_ ? (high - low_) / kLines : 0.0;
     }
     region_.clear();
     bool first = true;
@@ -452,6 +518,7 @@ class RangeTracer {
       if (ends.size() == 2) value->rows[0].emplace_back(EndAt(key, 0), EndAt(key, 1));
       return;
     }
+    if (line_ == 0.0) return;
     std::vector<std::vector<double>> crossings(kLines);
     ForEachArc(*value, [&](const TracedArc& arc) {
       for (size_t k = 1; k < arc.points.size(); ++k) {
@@ -475,22 +542,29 @@ class RangeTracer {
     }
   }
 
-  [[nodiscard]] size_t RowOf(double y) const {
-    return static_cast<size_t>(std::clamp((y - low_) / line_, 0.0, kLines - 1.0));
+  [[nodiscard]] bool Holds(const std::vector<Spans>& rows, const VecX& p) const {
+    if (space_.over() < 2) return Contains(rows[0], p[0]);
+    const double row = (p[1] - low_) / line_;
+    return row > -0.5 && row < kLines + 0.5 &&
+           Contains(rows[static_cast<size_t>(std::clamp(row, 0.0, kLines - 1.0))], p[0]);
   }
 
   // Pieces of the boundaries that are the boundary of all together, and poses inside.
   void Collect() {
     TracedSection section;
+    section.height = height_;
     section.area = set_.measure;
     section.error = set_.error;
+    if (empty_ || line_ == 0.0) {
+      set_.sections.push_back(std::move(section));
+      return;
+    }
     TracedLoop loop;
     std::array<std::pair<double, int>, 2> ends;
     bool first = true;
     for (const auto& [key, value] : values_) {
       for (const SpacePose& pose : value.traced.inside) {
-        const size_t row = space_.over() == 2 ? RowOf(pose.at[1]) : 0;
-        if (Contains(region_[row], pose.at[0])) set_.inside.push_back(pose);
+        if (Holds(region_, pose.at)) set_.inside.push_back(pose);
       }
       for (size_t e = 0; e < value.traced.ends.size(); ++e) {
         const std::pair<double, int> end = {EndAt(key, e), value.traced.ends[e].second};
@@ -500,7 +574,7 @@ class RangeTracer {
       first = first && value.traced.ends.empty();
       if (space_.over() != 2) continue;
       const ValueKey& own = key;
-      ForEachArc(value, [&](const TracedArc& arc) {
+      const auto add = [&](const TracedArc& arc) {
         TracedArc piece{arc.bound, {}};
         const auto end_piece = [&] {
           if (piece.points.size() > 1) loop.arcs.push_back(piece);
@@ -508,8 +582,7 @@ class RangeTracer {
         };
         for (const Vec2& p : arc.points) {
           const bool keep = std::ranges::all_of(values_, [&](const auto& other) {
-            return other.first == own ||
-                   Contains(other.second.rows[RowOf(p[1])], p[0]) == settings_.for_all;
+            return other.first == own || Holds(other.second.rows, p) == settings_.for_all;
           });
           if (keep) {
             piece.points.push_back(p);
@@ -518,7 +591,8 @@ class RangeTracer {
           }
         }
         end_piece();
-      });
+      };
+      ForEachArc(value, add);
     }
     if (space_.over() == 2) {
       section.loops.push_back(std::move(loop));
@@ -534,12 +608,260 @@ class RangeTracer {
   const int threads_;
   const std::function<void(double)>& progress_;
   const size_t count_;
-  ResultLog log_;
+  ResultLog* log_;
+  const double height_, rests_;
+  const PosesOfValues beside_;  // of the nearest sections
   int spacing_ = kFinest;
   std::map<ValueKey, AtValue> values_;
   std::vector<Spans> region_;
   double low_ = 0.0, line_ = 1.0, largest_error_ = 0.0;
+  bool empty_ = false;  // all of the range is asked, and one value has no place
   TracedSet set_;
+};
+
+// Sections of a solid, and their integral over the heights by Gauss–Kronrod rules.
+class RangeSolid {
+ public:
+  RangeSolid(const PoseSpace& space, const PlacedPose& start, int threads,
+             const std::function<void(double)>& progress, ResultLog* log)
+      : space_(space), start_(start), threads_(threads), progress_(progress), log_(log) {}
+
+  TracedSet Trace() {
+    TracedSet set;
+    set.low = Climb(-1.0);
+    set.high = Climb(1.0);
+    const double length = set.high - set.low;
+    double rule = 0.0;
+    if (lost_.ok() && length > 0.0) {
+      low_ = set.low;
+      length_ = length;
+      std::vector<Part> parts = {Rule(0.0, 1.0)};
+      const auto sum = [&](double Part::*member) {
+        double total = 0.0;
+        for (const Part& part : parts) total += part.*member;
+        return total;
+      };
+      const auto rests = [&] {
+        return std::max(kRuleRests * sum(&Part::value), ErrorOfAreas(set.low, set.high));
+      };
+      while (lost_.ok() && sum(&Part::error) > rests() && sections_.size() < kMostRangeSections) {
+        const auto worst = std::ranges::max_element(parts, {}, &Part::error);
+        const double at = GapOf(*worst).value_or(0.5 * (worst->a + worst->b));
+        const Part lower = Rule(worst->a, at);
+        *worst = Rule(at, worst->b);
+        parts.push_back(lower);
+      }
+      set.measure = sum(&Part::value);
+      rule = sum(&Part::error);
+    } else if (lost_.ok()) {
+      lost_.stop = Stop::kUnreachable;
+      lost_.message = "no place near the start has the range";
+    }
+    set.error = rule + beyond_ + ErrorOfAreas(set.low, set.high);
+    for (auto& [height, section] : sections_) {
+      set.closings += section.traced.closings;
+      std::ranges::move(section.traced.inside, std::back_inserter(set.inside));
+      std::ranges::move(section.traced.sections, std::back_inserter(set.sections));
+    }
+    set.closings += closings_;
+    set.summary = lost_;
+    return set;
+  }
+
+ private:
+  struct Section {
+    TracedSet traced;
+    PosesOfValues poses;
+    std::vector<Vec2> places;
+    std::set<int> bounds = {};
+  };
+  // Of the variable u, 0 … 1, of heights low + length (3 u² − 2 u³): areas may have a root at both
+  // ends.
+  struct Part {
+    double a, b, value = 0.0, error = 0.0;
+  };
+
+  // Gauss–Kronrod 7, 15, its error as QUADPACK has it [Piessens et al. 1983].
+  Part Rule(double a, double b) {
+    using Kronrod = boost::math::quadrature::gauss_kronrod<double, 15>;
+    using Gauss = boost::math::quadrature::gauss<double, 7>;
+    Part part{a, b};
+    double gauss = 0.0, spread = 0.0;
+    std::vector<std::pair<double, double>> values;
+    for (size_t k = 0; k < Kronrod::abscissa().size(); ++k) {
+      const double weight = 0.5 * (b - a) * Kronrod::weights()[k];
+      for (const double sign : {-1.0, 1.0}) {
+        if (k == 0 && sign > 0.0) continue;
+        const double u = 0.5 * (a + b + sign * (b - a) * Kronrod::abscissa()[k]);
+        const double height = heights_[u] = low_ + length_ * u * u * (3.0 - 2.0 * u);
+        Report();
+        const double y = AreaAt(height) * 6.0 * length_ * u * (1.0 - u);
+        values.emplace_back(weight, y);
+        part.value += weight * y;
+        if (k % 2 == 0) gauss += 0.5 * (b - a) * Gauss::weights()[k / 2] * y;
+      }
+    }
+    for (const auto& [weight, y] : values) {
+      spread += weight * std::abs(y - part.value / (b - a));
+    }
+    part.error = std::abs(part.value - gauss);
+    if (spread > 0.0 && !GapOf(part)) {
+      part.error = spread * std::min(1.0, std::pow(200.0 * part.error / spread, 1.5));
+    }
+    return part;
+  }
+  // From section to section, and to both ends.
+  [[nodiscard]] double ErrorOfAreas(double low, double high) const {
+    double last = low, error = 0.0, sum = 0.0;
+    for (const auto& [height, section] : sections_) {
+      sum += 0.5 * (error + section.traced.error) * std::max(height - last, 0.0);
+      last = std::max(height, low);
+      error = section.traced.error;
+    }
+    return sum + 0.5 * error * std::max(high - last, 0.0);
+  }
+  // The middle of the widest gap of a part's sections that other bounds end from there on.
+  [[nodiscard]] std::optional<double> GapOf(const Part& part) const {
+    double widest = 0.0;
+    std::optional<double> middle;
+    for (auto below = heights_.upper_bound(part.a); below != heights_.end(); ++below) {
+      const auto above = std::next(below);
+      if (above == heights_.end() || above->first >= part.b) break;
+      const double at = 0.5 * (below->first + above->first);
+      const auto one = sections_.find(below->second), other = sections_.find(above->second);
+      if (above->first - below->first <= widest || one == sections_.end() ||
+          other == sections_.end() || one->second.bounds == other->second.bounds ||
+          std::min(at - part.a, part.b - at) < kSliverOfPart * (part.b - part.a)) {
+        continue;
+      }
+      widest = above->first - below->first;
+      middle = at;
+    }
+    return middle;
+  }
+
+  void Report() const {
+    if (progress_) progress_(1.0 - 1.0 / (1.0 + 0.05 * static_cast<double>(sections_.size())));
+  }
+
+  double AreaAt(double height) {
+    if (!lost_.ok()) return 0.0;
+    const auto known = sections_.find(height);
+    if (known != sections_.end()) return known->second.traced.measure;
+    PosesOfValues beside;
+    const auto offer = [&](const Section& section) {
+      for (const auto& [key, poses] : section.poses) {
+        beside[key].insert(beside[key].end(), poses.begin(), poses.end());
+      }
+    };
+    auto above = sections_.lower_bound(height), below = above;
+    for (size_t k = 0; k < kSectionsBeside && above != sections_.end(); ++k)
+      offer((above++)->second);
+    for (size_t k = 0; k < kSectionsBeside && below != sections_.begin(); ++k) {
+      offer((--below)->second);
+    }
+    PoseSpace flat = space_.Section(2);
+    flat.Hold(2, height);
+    RangeTracer tracer(flat, start_, threads_, {}, log_, height, std::move(beside),
+                       kSectionRests * largest_);
+    TracedSet traced = tracer.Trace();
+    if (!traced.summary.ok()) {
+      lost_ = traced.summary;
+      lost_.message = fmt::format("section at {:.6g}: {}", height, lost_.message);
+      return 0.0;
+    }
+    const double area = traced.measure;
+    largest_ = std::max(largest_, area);
+    Section& section = sections_[height];
+    section = {std::move(traced), tracer.Poses(), tracer.Places()};
+    for (const TracedLoop& loop : section.traced.sections[0].loops) {
+      for (const TracedArc& arc : loop.arcs) section.bounds.insert(arc.bound);
+    }
+    return area;
+  }
+
+  // Where the ways up (or down) from a section's places end: first (all) or last (some).
+  [[nodiscard]] double TopOf(const Section& section, double sign) {
+    const SpaceSettings& settings = space_.settings();
+    // Places of each value, by its nearest pose.
+    std::vector<std::pair<const ValueKey*, const std::vector<SpacePose>*>> values;
+    for (const auto& [key, poses] : section.poses) {
+      bool coarse = true;
+      for (const int i : key) coarse = coarse && i % (RangeTracer::kFinest / kFewestValues) == 0;
+      if (coarse) values.emplace_back(&key, &poses);
+    }
+    std::vector<double> ends(section.places.size() * values.size(), kNan);
+    std::atomic<long> closings = 0;
+    const auto walk = [&](size_t i) {
+      const auto& [key, poses] = values[i % values.size()];
+      const Vec2& place = section.places[i / values.size()];
+      PoseSpace own = space_;
+      const long before = own.closings();
+      for (size_t r = 0; r < settings.ranged.size(); ++r) {
+        own.Hold(settings.ranged[r].coordinate, poses->front().at[settings.ranged[r].coordinate]);
+      }
+      const auto nearest = std::ranges::min_element(*poses, {}, [&](const SpacePose& pose) {
+        return (pose.at.head<2>() - place).squaredNorm();
+      });
+      PlacedPose from, at;
+      VecX target = nearest->at;
+      target.head<2>() = place;
+      if (own.Place(*nearest, &from) && own.Close(from, target, &at) &&
+          at.pose.margin.minCoeff() >= 0.0) {
+        const auto end = EndOfWay(own, at, sign * own.UnitOf(2) * VecX::Unit(3, 2));
+        if (end) ends[i] = end->at[2];
+      }
+      closings += own.closings() - before;
+    };
+    OnThreads(ends.size(), threads_, walk);
+    closings_ += closings;
+    double top = kNan;
+    for (size_t p = 0; p < section.places.size(); ++p) {
+      double end = kNan;
+      for (size_t v = 0; v < values.size(); ++v) {
+        const double of = ends[p * values.size() + v];
+        // A value that does not reach the place ends nothing of some.
+        if (settings.for_all && !std::isfinite(of)) {
+          end = kNan;
+          break;
+        }
+        const bool farther = sign * (of - end) > 0.0;
+        if (!std::isfinite(end) || farther != settings.for_all) end = of;
+      }
+      if (!(sign * (top - end) >= 0.0) && std::isfinite(end)) top = end;
+    }
+    return top;
+  }
+
+  // Up (or down) to the last section that there is.
+  double Climb(double sign) {
+    double height = start_.pose.at[2], best = height;
+    for (int i = 0; i < kMostClimbs && AreaAt(height) > 0.0; ++i) {
+      Report();
+      const double top = TopOf(sections_.at(height), sign), gain = sign * (top - best);
+      if (!(gain > 0.0)) break;
+      best = top;
+      const double last = AreaAt(height);
+      height = best - sign * kBelow * gain;
+      if (gain < kBelow * std::abs(best - start_.pose.at[2]) || i + 1 == kMostClimbs) {
+        beyond_ += last * gain;
+        break;
+      }
+    }
+    return best;
+  }
+
+  const PoseSpace& space_;
+  const PlacedPose& start_;
+  const int threads_;
+  const std::function<void(double)>& progress_;
+  ResultLog* log_;
+  std::map<double, Section> sections_;
+  std::map<double, double> heights_;  // of u
+  double low_ = 0.0, length_ = 0.0;
+  RunSummary lost_ = RunSummary::Done();
+  double largest_ = 0.0, beyond_ = 0.0;  // area; volume behind the last sections
+  long closings_ = 0;
 };
 
 }  // namespace
@@ -547,7 +869,8 @@ class RangeTracer {
 TracedSet TraceRange(const PoseSpace& space, const PlacedPose& start, int threads,
                      const std::function<void(double)>& progress, ResultLog log) {
   const auto began = std::chrono::steady_clock::now();
-  TracedSet set = RangeTracer(space, start, threads, progress, std::move(log)).Trace();
+  TracedSet set = space.over() > 2 ? RangeSolid(space, start, threads, progress, &log).Trace()
+                                   : RangeTracer(space, start, threads, progress, &log).Trace();
   set.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return set;
 }

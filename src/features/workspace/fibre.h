@@ -7,7 +7,8 @@
 // of the branch that is followed from home. Two ways: Fibre goes through the range at one place x
 // and finds where margins are least (1), or where the least one is largest (2), by parabolas; the
 // flood asks it at every corner. TraceRange() traces the boundary at values of the range and
-// intersects (1), or unites (2), what is inside; the values are doubled until the measure rests.
+// intersects (1), or unites (2), what is inside; the values are doubled until the measure rests. Of
+// three free coordinates it does so in sections, whose areas are integrated over the third one.
 #pragma once
 
 #include <functional>
@@ -45,7 +46,7 @@ class Fibre {
   const SpaceSettings& settings_;
 };
 
-/// Of one or two free coordinates; kUnsupported of three.
+/// Nothing depends on the number of threads.
 [[nodiscard]] TracedSet TraceRange(const PoseSpace& space, const PlacedPose& start, int threads,
                                    const std::function<void(double)>& progress = {},
                                    ResultLog log = {});

@@ -189,10 +189,20 @@ class Flooder {
     const bool unique = !fibre_.any() || space_.settings().for_all;
     if (unique && known.inside && corner.inside && Differ(known.pose, corner.pose)) {
       ++set_.conflicts;
+      const double margin = std::min(ConstraintMargin(known.pose), ConstraintMargin(corner.pose));
+      if (!(margin >= set_.conflict_margin)) {
+        set_.conflict_margin = margin;
+        set_.conflict_at = PointOf(known.pose.at.head(k_));
+      }
     }
     if (!known.inside && (corner.inside || (corner.passes && !known.passes))) {
       known = std::move(corner);
     }
+  }
+  [[nodiscard]] double ConstraintMargin(const SpacePose& pose) const {
+    const auto& bounds = space_.bounds();
+    const auto at = std::ranges::find(bounds, SetBound::Kind::kConstraint, &SetBound::kind);
+    return pose.margin[at - bounds.begin()];
   }
   [[nodiscard]] bool Differ(const SpacePose& a, const SpacePose& b) const {
     for (size_t j = 0; j < a.X_FM.size(); ++j) {

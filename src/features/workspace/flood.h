@@ -55,6 +55,9 @@ struct FloodedSet {
   std::vector<FloodPoint> lattice;  ///< coarsest corners, the first coordinate fastest
   std::array<double, 3> lattice_step{};
   long corners = 0, inside = 0, closings = 0, conflicts = 0;
+  Vec3 conflict_at =
+      Vec3::Zero();               ///< of the conflict nearest to a constraint singularity, and its
+  double conflict_margin = kNan;  ///< margin: what loops hold with by what they do at home
   double wall_s = 0.0;
 };
 

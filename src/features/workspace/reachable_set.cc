@@ -8,12 +8,14 @@
 #include <future>
 #include <map>
 #include <numbers>
+#include <set>
 
 #include "base/text.h"
 #include "base/worker_pool.h"
 #include "features/workspace/fibre.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
+#include "mechanism/idle_spins.h"
 #include "model_file/yaml/units.h"
 #include "reference/reduced_model.h"
 
@@ -25,9 +27,11 @@ using std::numbers::pi;
 constexpr size_t kMostNamed = 8;         // names in a message
 constexpr double kSingularHome = 1e-10;  // determinants of orthonormal motions below it are zero
 constexpr size_t kMostChecked = 24;
-constexpr double kMostError = 0.2;  // of both ways together, by the measure
-constexpr double kLong_s = 10.0;    // what takes longer is announced
-constexpr double kSamePose = 1e-8;  // of the reference [rad, characteristic lengths]
+constexpr double kMostError = 0.2;     // of both ways together, by the measure
+constexpr double kLong_s = 10.0;       // what takes longer is announced
+constexpr long kUsualFibres = 100000;  // times through a range that its sections of a solid cost
+constexpr double kWeakLoops = 0.1;     // of what they hold with at home: near where branches cross
+constexpr double kSamePose = 1e-8;     // of the reference [rad, characteristic lengths]
 constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 constexpr const char* kNameOne =
     "name a body or a frame by --output, joints or drives by --over, or state outputs: in the "
@@ -40,12 +44,46 @@ struct Assigned {
   UnitSuffix unit = kPlain;
 };
 
+// Makes parts between two balls symmetric about the line through these whose spins are idle but for
+// that: centres of mass move onto it, inertias are averaged. Nothing else feels their turn where
+// only places are asked; held at a joint's coordinate they would end sets. The parts' names.
+std::vector<std::string> MakeSymmetric(Mechanism* mechanism) {
+  std::vector<std::string> names;
+  for (const Spin& spin : FindSpins(*mechanism)) {
+    if (spin.why_not.empty()) continue;
+    Mechanism even = *mechanism;
+    const Pose& X_WB0 = even.X_WB_home[static_cast<size_t>(spin.bodies[0])];
+    const Vec3 p_WP = X_WB0 * spin.p_BP, n_W = X_WB0.linear() * spin.n_B;
+    for (const int b : spin.bodies) {
+      Body& body = even.bodies[static_cast<size_t>(b)];
+      const Pose X_BW = even.X_WB_home[static_cast<size_t>(b)].inverse();
+      const Vec3 p = X_BW * p_WP, n = X_BW.linear() * n_W;
+      body.p_BoBcm_B = p + n * n.dot(body.p_BoBcm_B - p);
+      const double along = n.dot(body.I_Bcm_B * n);
+      const double round = 0.5 * (body.I_Bcm_B.trace() - along);
+      body.I_Bcm_B = round * Mat3::Identity() + (along - round) * n * n.transpose();
+    }
+    const std::vector<Spin> idle = IdleSpins(even);
+    if (std::ranges::find(idle, spin.balls, &Spin::balls) == idle.end()) continue;
+    *mechanism = std::move(even);
+    names.push_back(spin.name);
+  }
+  return names;
+}
+
 class QuestionReader {
  public:
   QuestionReader(const Mechanism& mechanism, const SetArguments& arguments,
                  Diagnostics* diagnostics)
       : arguments_(arguments), diagnostics_(*diagnostics) {
     question_.mechanism = mechanism;
+    const std::vector<std::string> even = MakeSymmetric(&question_.mechanism);
+    if (!even.empty()) {
+      question_.notes.push_back(
+          "taken as symmetric about the line through their balls, about which they turn by "
+          "themselves: " +
+          Joined(even, kMostNamed));
+    }
   }
 
   std::optional<SetQuestion> Read() {
@@ -251,10 +289,6 @@ class QuestionReader {
       }
     }
     question_.settings.for_all = !arguments_.for_all.empty();
-    if (!ranged_.empty() && over_.size() > 2) {
-      Error("--over", "a range of further coordinates is asked of one or two free ones",
-            "hold one of the coordinates by --at");
-    }
   }
 
   void ReadFrom() {
@@ -369,16 +403,40 @@ class QuestionReader {
     for (const NamedCoordinate& named : at_) add(named);
     const size_t stated = candidates.size();
     for (const Prescribed& prescribed : m.prescribed) add(*Find(prescribed.name));
+    // Of drives and joints that are asked, the other drives rest; else the output does.
+    const bool of_output = std::ranges::any_of(over_, [](const NamedCoordinate& named) {
+      return named.coordinate.kind == Coordinate::Kind::kOutput;
+    });
+    const auto add_drives = [&] {
+      for (const Drive& drive : m.drives) add(*Find(drive.name));
+    };
+    if (!of_output) add_drives();
     if (!output_.empty()) {
       for (const char* component : kComponents) add(*Find(output_ + "." + component));
     }
-    for (const Drive& drive : m.drives) add(*Find(drive.name));
+    add_drives();
     const size_t preferred = candidates.size();
-    for (const NamedCoordinate& named : known_) add(named);
-    std::vector<Coordinate> coordinates;
-    coordinates.reserve(candidates.size());
-    for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
-    const CoordinateChoice choice = ChooseCoordinates(m, coordinates, preferred);
+    // Balls of rods, whose own turn depends on the way, only where nothing else holds it.
+    std::set<int> balls;
+    for (const Spin& spin : IdleSpins(m)) balls.insert(spin.balls.begin(), spin.balls.end());
+    const auto of_rod = [&](const NamedCoordinate& named) {
+      return named.coordinate.kind == Coordinate::Kind::kJoint &&
+             balls.contains(named.coordinate.index);
+    };
+    for (const NamedCoordinate& named : known_) {
+      if (!of_rod(named)) add(named);
+    }
+    const auto choose = [&] {
+      std::vector<Coordinate> coordinates;
+      coordinates.reserve(candidates.size());
+      for (const NamedCoordinate& named : candidates) coordinates.push_back(named.coordinate);
+      return ChooseCoordinates(m, coordinates, preferred);
+    };
+    CoordinateChoice choice = choose();
+    if (choice.left() > 0) {
+      for (const NamedCoordinate& named : known_) add(named);
+      choice = choose();
+    }
     if (choice.dofs == 0) {
       Error(m.file, "the model has no degree of freedom at home", "see mbverify model");
       return false;
@@ -607,6 +665,23 @@ std::string UnitOfMeasure(const std::vector<std::string>& units) {
   return text;
 }
 
+// What both ways found is ambiguous: which branch is followed depends on the way.
+std::string ConflictText(const ReachableSet& set) {
+  std::string text =
+      fmt::format("{} poses of the lattice are reached in two ways", set.flooded.conflicts);
+  if (!(set.flooded.conflict_margin < kWeakLoops)) return text;
+  std::vector<std::string> places;
+  for (size_t c = 0; c < set.over.size(); ++c) {
+    places.push_back(fmt::format("{} = {:.4g} {}", set.over[c],
+                                 set.flooded.conflict_at[static_cast<Eigen::Index>(c)],
+                                 set.over_units[c]));
+  }
+  return text + fmt::format(
+                    ", branches of which cross at a constraint singularity near {}: state a box "
+                    "that leaves it out, --over NAME=LOW:HIGH",
+                    Joined(places));
+}
+
 }  // namespace
 
 void JudgeSet(ReachableSet* result) {
@@ -625,8 +700,7 @@ void JudgeSet(ReachableSet* result) {
   result->agree = off <= error && sharp && flooded.conflicts == 0 && result->checked > 0 &&
                   result->checked_off < kSamePose;
   result->verdict =
-      flooded.conflicts > 0
-          ? fmt::format("{} poses of the lattice are reached in two ways", flooded.conflicts)
+      flooded.conflicts > 0  ? ConflictText(*result)
       : result->checked == 0 ? "the reference reaches none of the poses inside"
       : result->checked_off >= kSamePose
           ? fmt::format(
@@ -709,16 +783,20 @@ ReachableSet ComputeReachableSet(const SetQuestion& question, const SetArguments
   }
   const double boundary_s =
       settings.over == 3
-          ? plan.closing_s * static_cast<double>(kEnoughClosings) / arguments.flood.threads
+          ? plan.closing_s *
+                static_cast<double>(settings.ranged.empty() ? kEnoughClosings : kUsualFibres) /
+                arguments.flood.threads
           : 0.0;
   if (which.lattice && which.announce && plan.estimate_s + boundary_s > kLong_s) {
-    which.announce(fmt::format(
-        "the lattice takes about {}{}", TimeText(plan.estimate_s),
-        settings.over == 3
-            ? fmt::format(
+    const std::string boundary =
+        settings.over < 3 ? ""
+        : !settings.ranged.empty()
+            ? fmt::format(", the boundary about {}", TimeText(boundary_s))
+            : fmt::format(
                   ", the boundary up to {} (a million poses; six where its sections change)",
-                  TimeText(boundary_s))
-            : ""));
+                  TimeText(boundary_s));
+    which.announce(
+        fmt::format("the lattice takes about {}{}", TimeText(plan.estimate_s), boundary));
   }
   // Both ways at once; neither knows of the other.
   FloodSettings flood = arguments.flood;

@@ -110,8 +110,10 @@ void JudgeSet(ReachableSet* set);
 /// nodes each [m or rad], within a cell of the lattice. Empty of other dimensions.
 [[nodiscard]] std::vector<TracedArc> ConstraintCurves(const SetQuestion& question,
                                                       const ReachableSet& set);
-/// The same of three dimensions: a surface of free coordinates, nodes on lines between corners of
-/// the lattice.
-[[nodiscard]] TriangleMesh ConstraintSurface(const SetQuestion& question, const ReachableSet& set);
+/// The same of three dimensions, or where the drives lose their hold (kType2) inside a set that
+/// crosses such poses: a surface of free coordinates, nodes on lines between corners of the
+/// lattice.
+[[nodiscard]] TriangleMesh SingularSurface(const SetQuestion& question, const ReachableSet& set,
+                                           SetBound::Kind kind);
 
 }  // namespace mbv

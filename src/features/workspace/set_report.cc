@@ -392,6 +392,12 @@ std::vector<ReportSection> SectionsOf(const SetReport& report) {
                             surface.triangles.size()),
                 On::kAll);
   }
+  if (const TriangleMesh& surface = report.type2_surface; !surface.triangles.empty()) {
+    bounds.Note(fmt::format("the drives lose their hold (type 2) inside the set, on a surface of "
+                            "{} triangles in reachable_type2.stl",
+                            surface.triangles.size()),
+                On::kAll);
+  }
   sections.push_back(std::move(bounds));
 
   ReportSection quality{.title = "Quality", .link = "Quality"};
@@ -613,6 +619,7 @@ Json ToJson(const SetReport& report) {
       {"checked_difference", Number(set.checked_off)},
       {"characteristic_length_m", Number(set.length)},
       {"constraint_cells", report.constraint.size() + report.constraint_surface.triangles.size()},
+      {"type2_triangles", report.type2_surface.triangles.size()},
       {"quality", std::move(indices)}};
   if (!set.ranged.empty()) json[set.for_all ? "for_all" : "for_some"] = std::move(ranged);
   return json;
@@ -651,6 +658,9 @@ std::vector<std::pair<std::string, std::string>> SetFiles(const SetReport& repor
   files.emplace_back("reachable.ply", ColoredPly(set, title));
   if (!report.constraint_surface.triangles.empty()) {
     files.emplace_back("reachable_constraint.stl", ToStl(report.constraint_surface, title));
+  }
+  if (!report.type2_surface.triangles.empty()) {
+    files.emplace_back("reachable_type2.stl", ToStl(report.type2_surface, title));
   }
   return files;
 }

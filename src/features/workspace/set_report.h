@@ -25,6 +25,7 @@ struct SetReport {
   QualityMap quality;
   std::vector<TracedArc> constraint;  ///< constraint singularities inside (constraint_curves.cc)
   TriangleMesh constraint_surface;    ///< the same of three dimensions
+  TriangleMesh type2_surface;         ///< of three, where the drives lose their hold
   std::vector<KnownMeasure> known;
 
   /// Of both ways and of all that is known otherwise.

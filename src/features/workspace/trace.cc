@@ -45,6 +45,7 @@ constexpr double kFirstStep = 0.05, kLargestStep = 0.4, kLongerStep = 1.6;
 constexpr double kFar = 200.0;                          // a ray that goes on for so long has no end
 constexpr int kMostSteps = 20000, kMostArcSteps = 800;  // of a path, of a loop
 constexpr double kTip = 1e-4;  // of a solid's height, by which another part's end is farther
+constexpr double kUsualStep = 0.05, kMostRounds = 20.0;  // of a loop beyond; by its size
 constexpr int kSpreadRows = 6;
 constexpr int kRays = 8, kChords = 12;  // from home; from each loop
 // Of a solid's section: loops with which it is lost (near an end, where it is only to get farther),
@@ -654,8 +655,14 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
     same.assign(same.size(), true);
   };
   enum class Event { kNone, kCorner, kCloses, kCrossing };
-  int idle = 0;  // corners at the same point
-  for (int step = 0; step < most_steps_; ++step) {
+  int idle = 0;                      // corners at the same point
+  double turned = 0.0, moved = 0.0;  // by the joints, by the coordinates
+  // Longer where joints turn fast, as screws do: no steps are lost, and it goes round once.
+  const auto goes_on = [&](int step) {
+    return step < most_steps_ ||
+           (step < kMostSteps && turned > kUsualStep * step && moved < kMostRounds * size);
+  };
+  for (int step = 0; goes_on(step); ++step) {
     const Curve curve{&here.at, here.bound, t, n, s0, rate, twice};
     const bool singular =
         !twice && IsSingularity(space_.bounds()[static_cast<size_t>(here.bound)].kind);
@@ -793,6 +800,8 @@ TracedLoop Tracer::Trace(const Hit& start, int open) {
         const Vec2 span = x.rowwise().maxCoeff() - x.rowwise().minCoeff();
         // From the start: less rounding.
         const Eigen::Matrix<double, 2, kDegree + 1> y = x.colwise() - x_start;
+        turned += h;
+        moved += (x.col(kDegree) - x.col(0)).norm();
         area += 0.5 * (y.row(0) * nodes.area * y.row(1).transpose() -
                        y.row(1) * nodes.area * y.row(0).transpose())
                           .value();
@@ -1704,10 +1713,11 @@ TracedSet TraceLine(const PoseSpace& space, const PlacedPose& home) {
   return set;
 }
 
-TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds) {
+TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds, double height) {
   TracedSet set;
   Tracer tracer(space);
   TracedSection section;
+  section.height = height;
   const bool found = tracer.TraceAll(seeds, &section, &set.inside) &&
                      tracer.Probe(PointsIn(section), &section, &set.inside);
   if (tracer.unbounded()) return Unbounded(set);
@@ -1726,8 +1736,13 @@ TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds
 
 }  // namespace
 
-TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside) {
-  return space.over() == 1 ? TraceLine(space, inside.front()) : TraceArea(space, inside);
+TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside, double height) {
+  return space.over() == 1 ? TraceLine(space, inside.front()) : TraceArea(space, inside, height);
+}
+
+std::optional<SpacePose> EndOfWay(const PoseSpace& space, const PlacedPose& from, const VecX& ray) {
+  const auto hit = Tracer(space).Walk(from, ray);
+  return hit ? std::optional(hit->at.pose) : std::nullopt;
 }
 
 TracedArc Resampled(const TracedArc& arc, int finer) {

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -79,8 +80,13 @@ inline constexpr long kEnoughClosings = 1000000;
                                  const std::function<void(double)>& progress = {},
                                  double share = 1e-8, int threads = 1, ResultLog log = {});
 
-/// Of one or two dimensions, from several poses inside.
-[[nodiscard]] TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside);
+/// Of one or two dimensions, from several poses inside; with a height a solid's section.
+[[nodiscard]] TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside,
+                                  double height = kNan);
+/// Where a straight way of the free coordinates leaves the set; nothing where it is lost or has no
+/// end.
+[[nodiscard]] std::optional<SpacePose> EndOfWay(const PoseSpace& space, const PlacedPose& from,
+                                                const VecX& ray);
 /// The curve with `finer` points for each of its own, by its polynomials.
 [[nodiscard]] TracedArc Resampled(const TracedArc& arc, int finer);
 

@@ -210,7 +210,8 @@ int SetOfPoses(const WorkspaceArguments& arguments, const Mechanism& mechanism,
   report.quality = MapQuality(*question, report.set, question->output, arguments.jobs,
                               StageOf(progress, "qualities"));
   report.constraint = ConstraintCurves(*question, report.set);
-  report.constraint_surface = ConstraintSurface(*question, report.set);
+  report.constraint_surface = SingularSurface(*question, report.set, SetBound::Kind::kConstraint);
+  report.type2_surface = SingularSurface(*question, report.set, SetBound::Kind::kType2);
   line->Clear();
   WorkspaceOutcome form;
   if (FindWorkspaceForm(mechanism.name) != nullptr) {

@@ -272,6 +272,63 @@ outputs: {tool: tool}
   }
 }
 
+// An arm of r turns at the end of a gantry, its tip within L of a centre.
+std::string TurningArm(double r, double L) {
+  return fmt::format(R"(
+name: arm
+bodies:
+  bridge: {{mass: 1, inertia: [1, 1, 1]}}
+  trolley: {{mass: 1, inertia: [1, 1, 1]}}
+  quill: {{mass: 1, inertia: [1, 1, 1]}}
+  arm: {{mass: 1, inertia: [1, 1, 1], frames: {{tip: [{}, 0, 0]}}}}
+world: {{frames: {{centre: [{}, 0.02, 0.03]}}}}
+joints:
+  x: {{kind: prismatic, parent: world, child: bridge, axis: x}}
+  y: {{kind: prismatic, parent: bridge, child: trolley, axis: y}}
+  z: {{kind: prismatic, parent: trolley, child: quill, axis: z}}
+  turn: {{kind: revolute, parent: quill, child: arm, axis: z}}
+drives:
+  x: {{kind: joint, joint: x}}
+  y: {{kind: joint, joint: y}}
+  z: {{kind: joint, joint: z}}
+  turn: {{kind: joint, joint: turn}}
+  reach: {{kind: distance, from: world.centre, to: arm.tip, range: [-1, {}]}}
+outputs: {{hub: arm}}
+)",
+                     r, r > L ? r : 0.02, L);
+}
+void ExpectVolume(const RangeAnswer& answer, double volume, double other) {
+  ExpectArea(answer, volume, 1e-2);
+  EXPECT_LT(answer.set.traced.error, 4e-3 * volume);
+  // An arm that is a hundredth longer shows.
+  EXPECT_GT(std::abs(volume - other), 2 * answer.set.traced.error);
+}
+
+// At each height z from the centre the whole turn has a disc of R − r, R² = L² − z², up to z = h.
+TEST(Fibre, ASolidOfAllOfATurnIsThatByHand) {
+  SetArguments arguments = OverRange({"x", "y", "z"}, 16);
+  arguments.for_all = {"turn_deg=-180:180"};
+  const auto volume = [](double r, double L) {
+    const double h = std::sqrt(L * L - r * r);
+    return 2 * pi * (h * L * L - h * h * h / 3 - r * L * L * std::asin(h / L));
+  };
+  const RangeAnswer answer = AskRange(TurningArm(0.1, 0.2), arguments);
+  ExpectVolume(answer, volume(0.1, 0.2), volume(0.101, 0.2));
+  const double h = std::sqrt(0.2 * 0.2 - 0.1 * 0.1);
+  EXPECT_NEAR(answer.set.traced.low, 0.03 - h, 1e-4);
+  EXPECT_NEAR(answer.set.traced.high, 0.03 + h, 1e-4);
+}
+
+// What a ball sweeps along an arc [Pappus], and its halves at both ends.
+TEST(Fibre, ASolidOfSomeOfATurnIsThatByHand) {
+  SetArguments arguments = OverRange({"x", "y", "z"}, 16);
+  arguments.for_some = {"turn_deg=-20:25"};
+  const auto volume = [](double r, double L) { return pi * L * L * (pi / 4 * r + 4.0 / 3.0 * L); };
+  const RangeAnswer answer = AskRange(TurningArm(0.3, 0.1), arguments);
+  ExpectVolume(answer, volume(0.3, 0.1), volume(0.303, 0.1));
+  EXPECT_NEAR(answer.set.traced.high, 0.13, 1e-4);
+}
+
 TEST(Fibre, WhatCannotBeAskedIsRefused) {
   SetArguments arguments = OverRange({"x", "y"}, 20);
   arguments.for_all = {"yaw_deg=-15:20"};

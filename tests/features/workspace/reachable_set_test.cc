@@ -133,6 +133,115 @@ TEST(ReachableSet, ABoxEndsALongWay) {
   ExpectMeasure(answer, 9.5, 1e-9);
 }
 
+// A disc whose boundary takes 600 rad of the screws.
+TEST(ReachableSet, ABoundaryAlongWhichScrewsTurnFastComesBack) {
+  const Answer answer = Ask(FromText(R"(
+name: screws
+parameters: {lead: {value: 0.02, unit: m}}
+bodies:
+  bridge: {mass: 1, inertia: [1, 1, 1]}
+  tool: {mass: 1, inertia: [1, 1, 1]}
+  screw1: {mass: 1, inertia: [1, 1, 1]}
+  screw2: {mass: 1, inertia: [1, 1, 1]}
+world: {frames: {centre: [0.02, -0.01, 0.05]}}
+joints:
+  x: {kind: prismatic, parent: world, child: bridge, axis: x}
+  y: {kind: prismatic, parent: bridge, child: tool, axis: y}
+  screw1: {kind: revolute, parent: world, child: screw1, axis: x}
+  screw2: {kind: revolute, parent: bridge, child: screw2, axis: y}
+couplings:
+  thread1: {joint: screw1, follows: x, ratio: 2*pi/lead}
+  thread2: {joint: screw2, follows: y, ratio: 2*pi/lead}
+drives:
+  screw1: {kind: joint, joint: screw1}
+  screw2: {kind: joint, joint: screw2}
+  reach: {kind: distance, from: world.centre, to: tool, range: [-1, 0.25]}
+outputs: {tool: tool}
+)"),
+                            Over({"x", "y"}, 40));
+  ExpectMeasure(answer, pi * (0.25 * 0.25 - 0.05 * 0.05), 1e-9);
+}
+
+TEST(ReachableSet, OfDrivesThatAreAskedTheOthersRest) {
+  Diagnostics diagnostics;
+  const auto held = [&](const std::vector<std::string>& over) {
+    const auto question = ReadQuestion(ShippedModel("stewart"), Over(over), &diagnostics);
+    EXPECT_TRUE(question.has_value()) << diagnostics.Text();
+    std::vector<std::string> names;
+    for (const NamedCoordinate& named : question->settings.coordinates) names.push_back(named.name);
+    names.erase(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(over.size()));
+    return names;
+  };
+  EXPECT_THAT(held({"leg1.length", "leg2.length"}),
+              testing::ElementsAre("leg3.length", "leg4.length", "leg5.length", "leg6.length"));
+  EXPECT_THAT(held({"x", "leg2.length"}),
+              testing::ElementsAre("platform.y", "platform.z", "platform.roll", "platform.pitch"));
+}
+
+TEST(ReachableSet, PosesThatAreReachedInTwoWaysAreNamedWhereBranchesCross) {
+  ReachableSet set;
+  set.over = {"tool.x", "tool.y"};
+  set.over_units = {"m", "m"};
+  set.traced.summary = set.flooded.summary = RunSummary::Done();
+  set.flooded.conflicts = 3;
+  set.flooded.conflict_at = Vec3(0.25, -0.5, 0.0);
+  for (const double margin : {0.01, 0.9}) {
+    set.flooded.conflict_margin = margin;
+    JudgeSet(&set);
+    EXPECT_FALSE(set.agree);
+    EXPECT_THAT(set.verdict, HasSubstr("3 poses of the lattice are reached in two ways"));
+    EXPECT_EQ(set.verdict.find("constraint singularity near tool.x = 0.25 m, tool.y = -0.5 m") !=
+                  std::string::npos,
+              margin < 0.1);
+  }
+}
+
+// A rod between two balls turns about their line by itself, whatever its mass: nothing is held.
+TEST(ReachableSet, ARodWhoseMassIsBesideItsLineIsHeldByNothing) {
+  const std::string text = R"(
+name: ball_rod
+bodies:
+  crank: {mass: 1, inertia: [1, 1, 1], frames: {pin: [0.1, 0, 0]}}
+  rod: {mass: 1, com: [0.1, 0.03, 0], inertia: [0.01, 0.02, 0.02], frames: {end: [0.3, 0, 0]}}
+  slider: {mass: 1, inertia: [1, 1, 1]}
+world: {frames: {way: [0, 0, 0.05]}}
+joints:
+  shaft: {kind: revolute, parent: world, child: crank, axis: z, guess: 0.5}
+  A: {kind: spherical, parent: crank.pin, child: rod}
+  slide: {kind: prismatic, parent: world.way, child: slider, axis: x, guess: 0.38}
+  B: {kind: spherical, parent: rod.end, child: slider, closure: true}
+drives: {shaft: {kind: joint, joint: shaft}}
+outputs: )";
+  const Answer answer = Ask(FromText(text + "{slider: slider}"), Over({"x"}, 100));
+  ASSERT_EQ(answer.set.traced.ends.size(), 2u) << answer.diagnostics.Text() << answer.set.verdict;
+  EXPECT_TRUE(answer.set.agree) << answer.set.verdict;
+  EXPECT_EQ(answer.set.dofs, 1);
+  EXPECT_THAT(answer.set.notes, testing::Contains(HasSubstr("by themselves: rod")));
+  const double middle = std::sqrt(0.3 * 0.3 - 0.05 * 0.05);
+  EXPECT_NEAR(answer.set.traced.ends[0].first, middle - 0.1, 1e-10);
+  EXPECT_NEAR(answer.set.traced.ends[1].first, middle + 0.1, 1e-10);
+  // A telescopic one, whose length nothing holds: the crank rests, not a ball, which turns more.
+  std::string telescopic = text + "{slider: slider}";
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    telescopic.replace(telescopic.find(from), from.size(), to);
+  };
+  replace("  slider: {mass", "  tube: {mass: 1, inertia: [1, 1, 1]}\n  slider: {mass");
+  replace("child: rod}",
+          "child: tube}\n  stroke: {kind: prismatic, parent: tube, child: rod, axis: x}");
+  replace("drives: {shaft: {kind: joint, joint: shaft}}\n", "");
+  Diagnostics of_telescopic;
+  const auto longer = ReadQuestion(FromText(telescopic), Over({"x"}), &of_telescopic);
+  ASSERT_TRUE(longer.has_value()) << of_telescopic.Text();
+  ASSERT_EQ(longer->settings.coordinates.size(), 2u);
+  EXPECT_THAT(longer->settings.coordinates[1].name, testing::AnyOf("shaft", "stroke"));
+  // Where its own poses are asked they show the turn.
+  Diagnostics diagnostics;
+  const auto question =
+      ReadQuestion(FromText(text + "{slider: slider, rod: rod}"), Over({"slider.x"}), &diagnostics);
+  ASSERT_TRUE(question.has_value()) << diagnostics.Text();
+  EXPECT_EQ(question->settings.coordinates.size(), 2u);
+}
+
 // cos θ1 cos θ2 > cos α.
 TEST(ReachableSet, AConeOfAUniversalJointIsACone) {
   const Mechanism joint = FromText(R"(
