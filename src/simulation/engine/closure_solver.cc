@@ -42,9 +42,12 @@ constexpr double kShortestStep = 1e-4;
 constexpr double kRankTolerance = 1e-9;
 // A self-stress with a smaller share in a row does not act there.
 constexpr double kActs = 1e-6;
-// With more rows than velocities: of more velocities, factors are sparse. Where velocities are left
-// open, of many alone.
+// With more rows than velocities: of more velocities, factors are sparse. Where motions are left
+// open, of many velocities alone that leave few, by this share.
 constexpr int kLargestDense = 6, kFewVelocities = 100;
+constexpr double kFewMotions = 0.25;
+
+bool LeavesFew(int motions, int rank) { return motions <= kFewMotions * rank; }
 
 // The shortest x with A x = b as well as can be, refined once.
 VecX LeastNorm(const MatX& A, const VecX& b) {
@@ -100,7 +103,8 @@ void ClosureSolver::Factor() {
 // e = 0 where λ can balance τ.
 bool ClosureSolver::FactorBeside() {
   const SparseRank rank(SparseLu::Matrix(columns_.transpose()), kRankTolerance);
-  if (!rank.clear()) return false;
+  const int left = system_->nv() - rank.rank();
+  if (!rank.clear() || left == 0 || !LeavesFew(left, rank.rank())) return false;
   const MatX basis = rank.NullSpace();
   motions_ =
       Eigen::HouseholderQR<MatX>(basis).householderQ() * MatX::Identity(basis.rows(), basis.cols());
@@ -297,7 +301,7 @@ void ClosureSolver::SolveForces(const VecX& tau) {
 bool ClosureSolver::FactorHere() {
   system_->FillScaledTranspose(&columns_here_);
   if (undriven() == 0) return least_here_.Factor(columns_here_, kRankTolerance);
-  if (system_->nv() <= kFewVelocities) return false;
+  if (system_->nv() <= kFewVelocities || !LeavesFew(undriven(), rank_)) return false;
   if (static_cast<int>(held_.size()) != undriven()) {
     Hold(SparseRank(SparseLu::Matrix(columns_here_.transpose()), kRankTolerance));
     if (static_cast<int>(held_.size()) != undriven()) return false;
