@@ -128,7 +128,7 @@ double LinesOf(const Vec3& at, double end) {
   const Mat3 R = Eigen::AngleAxisd(at[2], Vec3::UnitZ()).toRotationMatrix();
   Mat3 lines;
   for (int i = 0; i < 3; ++i) {
-    const auto k = static_cast<size_t>(2 * i);
+    const auto k = size_t{2} * static_cast<size_t>(i);
     const Vec3 b = R * Vec3(kEnds.at(k) + (i == 0 ? end : 0.0), kEnds.at(k + 1), 0.0);
     const Vec3 d = Vec3(at[0], at[1], 0.0) + b - Vec3(kFeet.at(k), kFeet.at(k + 1), 0.0);
     lines.row(i) << d[0], d[1], b.cross(d)[2];
