@@ -15,7 +15,9 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "comparison/comparison.h"
@@ -363,9 +365,19 @@ Attribution BySingleCheck(const Comparison& comparison) {
 
 std::string AgreementText(const ComparisonInput& input, const Comparison& comparison) {
   std::string text;
-  // A free motion has no drive force to compare.
-  for (const Metric metric : {Metric::kForceNrmse, Metric::kStiffnessEntry, Metric::kPoseM,
-                              Metric::kPositionM, Metric::kPositionRad}) {
+  const auto share_of_limit = [&](Metric metric) {
+    double most = -1.0;
+    for (const CheckResult& check : comparison.checks) {
+      if (check.metric == metric && check.limit) most = std::max(most, check.value / *check.limit);
+    }
+    return most;
+  };
+  // A free motion has no drive force to compare: by what is nearest to its limit, as outputs may
+  // rest.
+  std::array<Metric, 3> motions = {Metric::kPoseM, Metric::kPositionM, Metric::kPositionRad};
+  std::ranges::stable_sort(motions, std::greater<>(), share_of_limit);
+  for (const Metric metric :
+       {Metric::kForceNrmse, Metric::kStiffnessEntry, motions[0], motions[1], motions[2]}) {
     const Yardstick yardstick{.title = "", .unit = RowOf(metric).unit, .metric = metric};
     for (const Distance& distance : Distances(input, comparison, yardstick)) {
       text += fmt::format("{}{} and {} agree to {}", text.empty() ? "" : ", ",

@@ -355,6 +355,16 @@ TEST(Attribution, ADriveMotionThatNothingConfirmsIsWhatTheyHaveInCommon) {
 
 TEST(Attribution, AgreementStatesHowWell) {
   EXPECT_TRUE(Mentions(Case().Run().attribution, "reference and analytic agree to 0.0e+00"));
+  // Of a free motion, whose output may rest, what is nearest to its limit.
+  Case free;
+  free.motion.commands.clear();
+  free.motion.initial = {{.name = "d1", .coordinate = {Coordinate::Kind::kDrive, 0, 0}}};
+  free.motion.forces = {{.drive = 0, .force = Constant(1.0)}, {.drive = 1, .force = Constant(1.0)}};
+  free.column = LimitColumn::kForward;
+  EXPECT_TRUE(Mentions(free.Run().attribution, "simulation and reference agree to 0 m"));
+  Perturb(&free.simulated, "d1.position", 1e-9);
+  EXPECT_TRUE(Mentions(free.Run().attribution, "simulation and reference agree to 1e-09 m"))
+      << free.Run().attribution.text;
 }
 
 }  // namespace
