@@ -11,7 +11,6 @@
 #include <numbers>
 #include <optional>
 #include <set>
-#include <thread>
 
 namespace mbv {
 namespace {
@@ -194,18 +193,6 @@ namespace {
 using ValueKey = std::array<int, 3>;  // of the finest grid of the range
 using Spans = std::vector<std::pair<double, double>>;
 using PosesOfValues = std::map<ValueKey, std::vector<SpacePose>>;
-
-// work(i) for all i, on all threads.
-void OnThreads(size_t count, int threads, const std::function<void(size_t)>& work) {
-  std::atomic<size_t> next = 0;
-  const auto run = [&] {
-    for (size_t i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::thread> others;
-  for (int t = 1; t < threads && static_cast<size_t>(t) < count; ++t) others.emplace_back(run);
-  run();
-  for (std::thread& other : others) other.join();
-}
 
 Spans Combined(const Spans& a, const Spans& b, bool intersect) {
   Spans result;

@@ -1186,17 +1186,6 @@ class SolidTracer {
   void Report(double fraction) const {
     if (progress_) progress_(fraction);
   }
-  // work(i) for all i, on all threads.
-  void ForAll(size_t count, const std::function<void(size_t)>& work) const {
-    std::atomic<size_t> next = 0;
-    const auto run = [&] {
-      for (size_t i = next++; i < count; i = next++) work(i);
-    };
-    std::vector<std::thread> others;
-    for (int t = 1; t < threads_ && static_cast<size_t>(t) < count; ++t) others.emplace_back(run);
-    run();
-    for (std::thread& other : others) other.join();
-  }
   [[nodiscard]] std::string Trouble() const { return !lost_.empty() ? lost_ : solid_.trouble(); }
 
   // Up (or down) to the last section that there is.
@@ -1248,7 +1237,7 @@ class SolidTracer {
       std::vector<double> tops(fresh.size(), kNan);
       std::atomic<long> closed = 0;
       std::atomic<bool> endless = false;
-      ForAll(fresh.size(), [&](size_t i) {
+      OnThreads(fresh.size(), threads_, [&](size_t i) {
         Tracer tracer = solid_;
         const long before = tracer.space().closings();
         PlacedPose from;
@@ -1386,7 +1375,8 @@ class SolidTracer {
       if (std::next(at) != sections_.end()) beside.push_back(std::next(at));
       auto extended = log_.Get<std::vector<Found>>([&] {
         std::vector<Found> more(beside.size());
-        ForAll(more.size(), [&](size_t i) { more[i] = Extended(at->second, beside[i]->second); });
+        OnThreads(more.size(), threads_,
+                  [&](size_t i) { more[i] = Extended(at->second, beside[i]->second); });
         return more;
       });
       for (size_t i = 0; i < extended.size(); ++i) {
@@ -1459,7 +1449,7 @@ class SolidTracer {
     if (!lost_.empty() || heights.empty()) return;
     auto found = log_.Get<std::vector<Found>>([&] {
       std::vector<Found> traced(heights.size());
-      ForAll(heights.size(), [&](size_t i) { traced[i] = TraceAt(heights[i]); });
+      OnThreads(heights.size(), threads_, [&](size_t i) { traced[i] = TraceAt(heights[i]); });
       return traced;
     });
     for (Found& one : found) Keep(std::move(one));
@@ -1735,6 +1725,17 @@ TracedSet TraceArea(const PoseSpace& space, const std::vector<PlacedPose>& seeds
 }
 
 }  // namespace
+
+void OnThreads(size_t count, int threads, const std::function<void(size_t)>& work) {
+  std::atomic<size_t> next = 0;
+  const auto run = [&] {
+    for (size_t i = next++; i < count; i = next++) work(i);
+  };
+  std::vector<std::thread> others;
+  for (int t = 1; t < threads && static_cast<size_t>(t) < count; ++t) others.emplace_back(run);
+  run();
+  for (std::thread& other : others) other.join();
+}
 
 TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside, double height) {
   return space.over() == 1 ? TraceLine(space, inside.front()) : TraceArea(space, inside, height);

@@ -80,6 +80,8 @@ inline constexpr long kEnoughClosings = 1000000;
                                  const std::function<void(double)>& progress = {},
                                  double share = 1e-8, int threads = 1, ResultLog log = {});
 
+/// work(i) for all i below `count`, on as many threads.
+void OnThreads(size_t count, int threads, const std::function<void(size_t)>& work);
 /// Of one or two dimensions, from several poses inside; with a height a solid's section.
 [[nodiscard]] TracedSet TraceFrom(const PoseSpace& space, const std::vector<PlacedPose>& inside,
                                   double height = kNan);
